@@ -1,0 +1,123 @@
+// Every message on the bus: typed values, and the codec that turns them into bytes.
+//
+// One table per message in messages.cpp (offset, width, scale) is the only place that knows byte
+// positions. All numbers are little-endian. Positions travel as 48-bit integers of 0.1 nm or
+// 1e-10 rad, velocities as 32-bit integers of 10 nm/s or 1e-8 rad/s; the codec saturates at the ends.
+//
+//   COB-ID    sender      bytes  message
+//   000       NC unit     2      NMT command
+//   080       NC unit     1      SYNC with counter 1..240
+//   080+id    any         8      EMCY
+//   180+id    drives      16     DriveStatus   (id 1..5: X Y Z A C; 6: spindle)
+//   187       probe       32     ProbeSample
+//   188       overtravel  8      OvertravelState
+//   200       NC unit     64     GroupCommand
+//   700+id    any         1      heartbeat, boot-up
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "bus/frame.hpp"
+#include "bus/tick.hpp"
+
+namespace vcnc {
+
+// ------------------------------------------------------------------ identifiers (CiA 301)
+inline constexpr std::uint16_t kNmtId = 0x000, kSyncId = 0x080, kEmcyBase = 0x080,
+                               kStatusBase = 0x180, kCommandId = 0x200, kHeartbeatBase = 0x700;
+inline constexpr int kSpindleNode = 6, kProbeNode = 7, kOvertravelNode = 8;
+constexpr int drive_node(std::size_t axis) { return static_cast<int>(axis) + 1; }
+
+enum class NmtCommand : std::uint8_t { start = 0x01, stop = 0x02, preop = 0x80, reset_node = 0x81, reset_comm = 0x82 };
+enum class NmtState : std::uint8_t { boot_up = 0x00, stopped = 0x04, operational = 0x05, pre_operational = 0x7f };
+
+struct Nmt {
+  NmtCommand command = NmtCommand::start;
+  std::uint8_t node = 0;  ///< 0: all
+};
+struct Sync {
+  std::uint8_t counter = 1;  ///< 1..240
+};
+struct Heartbeat {
+  int node = 0;
+  NmtState state = NmtState::boot_up;
+};
+struct Emergency {
+  int node = 0;
+  std::uint16_t code = 0;          ///< CiA 301/402 error code
+  std::uint8_t error_register = 0;
+  std::array<std::uint8_t, 5> detail{};
+};
+
+// ------------------------------------------------------------------ cyclic messages
+/// Set-points of all drives for the end of the cycle in which they act.
+struct GroupCommand {
+  struct Setpoint {
+    double position = 0;  ///< [m or rad]
+    double velocity = 0;  ///< [m/s or rad/s] at that position
+  };
+  enum class SpindleMode : std::uint8_t { off = 0, clockwise = 1, counter_clockwise = 2, orient = 3 };
+  std::uint16_t tick = 0;          ///< low 16 bits of the tick in which it was sent
+  std::uint16_t controlword = 0;   ///< CiA 402, for the five axes together
+  std::array<Setpoint, 5> axes{};
+  SpindleMode spindle_mode = SpindleMode::off;
+  std::uint8_t flags = 0;          ///< kSpindleLock, kResetLatch
+  double spindle_speed = 0;        ///< [rad/s]
+};
+inline constexpr std::uint8_t kSpindleLock = 0x01;  ///< the NC unit asks the spindle drive to lock
+inline constexpr std::uint8_t kResetLatch = 0x02;   ///< operator's reset of latched protection
+
+struct DriveStatus {
+  int node = 0;
+  std::uint16_t tick = 0;
+  std::uint16_t statusword = 0;    ///< CiA 402
+  double position = 0;             ///< measured at the end of the cycle [m or rad]; spindle: angle
+  double second_encoder = 0;       ///< load side minus motor side [m or rad]; spindle: speed [rad/s]
+  double force = 0;                ///< share of the force limit, -3.2..3.2
+};
+
+struct ProbeSample {
+  enum Flag : std::uint16_t {
+    kContact = 0x01, kOutOfRange = 0x02, kSlip = 0x04, kSignalFault = 0x08, kOvertravel = 0x10
+  };
+  std::uint16_t tick = 0;          ///< low 16 bits of the instant the deflection belongs to
+  std::uint16_t flags = 0;
+  std::array<double, 3> deflection{};      ///< probe frame [m]
+  std::array<std::uint16_t, 6> adc{};      ///< x cos, x sin, y cos, y sin, z cos, z sin
+};
+
+struct OvertravelState {
+  enum class State : std::uint8_t { normal = 0, warn = 1, tripped = 2 };
+  enum class Cause : std::uint8_t { none = 0, range = 1, overtravel = 2, signal = 3, silent = 4 };
+  std::uint16_t tick = 0;
+  State state = State::normal;
+  Cause cause = Cause::none;
+  double deflection = 0;           ///< magnitude when it tripped, else now [m]
+};
+
+// ------------------------------------------------------------------ codecs
+// encode() never fails: values saturate. decode_x() gives nothing for a wrong id or length.
+Frame encode(const Nmt&);
+Frame encode(const Sync&);
+Frame encode(const Heartbeat&);
+Frame encode(const Emergency&);
+Frame encode(const GroupCommand&);
+Frame encode(const DriveStatus&);
+Frame encode(const ProbeSample&);
+Frame encode(const OvertravelState&);
+
+std::optional<Nmt> decode_nmt(const Frame&);
+std::optional<Sync> decode_sync(const Frame&);
+std::optional<Heartbeat> decode_heartbeat(const Frame&);
+std::optional<Emergency> decode_emergency(const Frame&);
+std::optional<GroupCommand> decode_group_command(const Frame&);
+std::optional<DriveStatus> decode_drive_status(const Frame&);
+std::optional<ProbeSample> decode_probe_sample(const Frame&);
+std::optional<OvertravelState> decode_overtravel_state(const Frame&);
+
+constexpr std::uint8_t sync_counter(Tick k) { return static_cast<std::uint8_t>(k % 240 + 1); }
+constexpr std::uint16_t low16(Tick k) { return static_cast<std::uint16_t>(k & 0xffff); }
+
+}  // namespace vcnc

@@ -1,0 +1,37 @@
+// What a module on the bus is: a pure step.
+//
+// A node owns no socket, thread, clock, sleep or file. Cycle k begins with SYNC(k); the node is then
+// given every frame that was sent in cycle k-1 and that it accepts, in CAN-ID order, steps its own
+// state through [t_k, t_k+1) and answers. So a frame sent in cycle k acts from cycle k+1 on,
+// whatever the transport and the scheduling of the host.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "bus/frame.hpp"
+#include "bus/tick.hpp"
+
+namespace vcnc {
+
+class Node {
+ public:
+  virtual ~Node() = default;
+  virtual int id() const = 0;                          ///< CANopen node id, 1..127
+  virtual std::string_view name() const = 0;           ///< for people: "drive X", "probe"
+  virtual bool accepts(std::uint16_t cob_id) const = 0;  ///< acceptance filter
+  /// One cycle. `inputs` are the accepted frames of cycle k-1 in CAN-ID order; answers are appended
+  /// to `out` and must begin with the node's cyclic frame (COB-ID 180h + id).
+  virtual void step(Tick k, std::span<const Frame> inputs, Frames& out) = 0;
+};
+
+/// The one module that drives the cycle (the NC unit).
+class Master {
+ public:
+  virtual ~Master() = default;
+  /// Ends cycle k: `answers` holds every node's frames of cycle k in CAN-ID order; commands for
+  /// cycle k+1 are appended to `out`. Returns false when the run is over.
+  virtual bool step(Tick k, std::span<const Frame> answers, Frames& out) = 0;
+};
+
+}  // namespace vcnc

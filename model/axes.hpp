@@ -1,0 +1,23 @@
+// The five interpolated axes, and arrays indexed by them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+namespace vcnc {
+
+inline constexpr std::size_t kAxisCount = 5;
+inline constexpr std::array<std::string_view, kAxisCount> kAxisNames{"X", "Y", "Z", "A", "C"};
+enum Axis : std::size_t { kX = 0, kY = 1, kZ = 2, kA = 3, kC = 4 };
+
+/// X, Y, Z are linear (SI unit m); A, C are rotary (SI unit rad).
+constexpr bool is_rotary(std::size_t axis) { return axis >= kA; }
+
+template <class T>
+using PerAxis = std::array<T, kAxisCount>;
+
+/// Positions [m, m, m, rad, rad] or their time derivatives.
+using AxisVector = PerAxis<double>;
+
+}  // namespace vcnc

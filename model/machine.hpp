@@ -1,0 +1,391 @@
+// The machine as data: every parameter a machine file may hold.
+//
+// What stands outside `effects` is the declared machine: what its builder says it is. `effects` holds
+// what a real machine does besides; every effect is absent by default (its null value), so that a
+// file without an [effects] table is the ideal machine. The analysis is only ever given the
+// declared part (see declared()).
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "model/axes.hpp"
+#include "model/fields.hpp"
+
+namespace vcnc {
+
+/// Which body carries the rotary axes. Equations: model/geometry/kinematics.hpp.
+struct KinematicsParams {
+  enum class Type { trunnion, head };
+  Type type = Type::trunnion;
+  Vec3 p_MA = Vec3::Zero();  ///< a point on the A axis, machine frame, axes at zero (trunnion)
+  Vec3 p_MC = Vec3::Zero();  ///< a point on the C axis, machine frame, axes at zero (trunnion)
+  Vec3 p_CA = Vec3::Zero();  ///< from the C axis to the A axis at zero (head)
+  Vec3 p_AG{0, 0, -0.2};     ///< from the A axis to the spindle gauge point at zero (head)
+  bool a_reversed = false;   ///< the control counts A against ISO 841
+  bool c_reversed = false;   ///< the control counts C against ISO 841
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    visit.choice("type", p.type, {{"trunnion", Type::trunnion}, {"head", Type::head}},
+                 "trunnion: A carries the C table; head: C carries the A spindle head");
+    visit("a_axis_point_mm", p.p_MA, unit::mm, Range{-1e4, 1e4}, "trunnion: a point on the A axis");
+    visit("c_axis_point_mm", p.p_MC, unit::mm, Range{-1e4, 1e4}, "trunnion: a point on the C axis");
+    visit("c_to_a_mm", p.p_CA, unit::mm, Range{-1e4, 1e4}, "head: from the C axis to the A axis");
+    visit("a_to_gauge_mm", p.p_AG, unit::mm, Range{-1e4, 1e4},
+          "head: from the A axis to the spindle gauge point (pivot length along -z)");
+    visit("a_reversed", p.a_reversed, "A counts against ISO 841");
+    visit("c_reversed", p.c_reversed, "C counts against ISO 841");
+  }
+};
+
+/// Travel and motion limits of one axis, SI (m or rad).
+struct AxisLimits {
+  double min = -1, max = 1, start = 0;
+  double velocity = 0.5, acceleration = 5, jerk = 50;
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit, bool rotary) {
+    const Range any{-1e6, 1e6}, positive{1e-3, 1e7};
+    visit(rotary ? "min_deg" : "min_mm", p.min, rotary ? unit::deg : unit::mm, any, "lower travel limit");
+    visit(rotary ? "max_deg" : "max_mm", p.max, rotary ? unit::deg : unit::mm, any, "upper travel limit");
+    visit(rotary ? "start_deg" : "start_mm", p.start, rotary ? unit::deg : unit::mm, any,
+          "position at switch-on; also the G28 reference position");
+    visit(rotary ? "velocity_deg_s" : "velocity_mm_s", p.velocity, rotary ? unit::deg_s : unit::mm_s,
+          positive, "largest velocity");
+    visit(rotary ? "acceleration_deg_s2" : "acceleration_mm_s2", p.acceleration,
+          rotary ? unit::deg_s2 : unit::mm_s2, positive, "largest acceleration");
+    visit(rotary ? "jerk_deg_s3" : "jerk_mm_s3", p.jerk, rotary ? unit::deg_s3 : unit::mm_s3, positive,
+          "largest jerk");
+  }
+};
+
+/// Cascade of one drive. Equations: model/drive/axis_drive.hpp.
+struct ServoParams {
+  enum class Feedback { motor, load };
+  double kv_per_s = 40;           ///< position loop gain
+  double velocity_bandwidth = 80; ///< velocity loop crossover [Hz]; Kp = 2 pi f J
+  double integral_time = 0.010;   ///< velocity loop integral time Ti [s]
+  double velocity_ff = 1;         ///< 1 = full velocity feed-forward
+  double acceleration_ff = 1;     ///< 1 = full acceleration feed-forward
+  double current_lag = 0;         ///< first-order lag of the force/torque [s]
+  Feedback feedback = Feedback::load;
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    visit("kv_per_s", p.kv_per_s, unit::per_s, Range{0.1, 1000}, "position loop gain");
+    visit("velocity_bandwidth_Hz", p.velocity_bandwidth, unit::hz, Range{1, 1000},
+          "velocity loop crossover frequency");
+    visit("integral_time_ms", p.integral_time, unit::ms, Range{0.5, 10000}, "velocity loop integral time");
+    visit("velocity_ff", p.velocity_ff, unit::none, Range{0, 2}, "velocity feed-forward, 1 = full");
+    visit("acceleration_ff", p.acceleration_ff, unit::none, Range{0, 2},
+          "acceleration feed-forward, 1 = full");
+    visit("current_lag_us", p.current_lag, unit::us, Range{0, 5000}, "lag of the current loop");
+    visit.choice("feedback", p.feedback, {{"motor", Feedback::motor}, {"load", Feedback::load}},
+                 "measuring system: indirect (motor) or direct (load)");
+  }
+};
+
+/// Moving masses and motor of one drive, SI (kg, N for linear; kg m^2, N m for rotary).
+struct MechanicsParams {
+  double load = 500;            ///< table and what it carries
+  double motor_inertia = 0.01;  ///< motor and screw [kg m^2]
+  double travel_per_turn = 0.012;  ///< [m] or [rad] per motor turn
+  double force_limit = 1e4;     ///< largest force or torque, load side
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit, bool rotary) {
+    visit(rotary ? "load_kgm2" : "load_kg", p.load, rotary ? unit::kgm2 : unit::kg, Range{1e-4, 1e5},
+          "moving mass or inertia on the load side");
+    visit("motor_inertia_kgm2", p.motor_inertia, unit::kgm2, Range{0, 100}, "motor and screw inertia");
+    visit(rotary ? "travel_per_turn_deg" : "travel_per_turn_mm", p.travel_per_turn,
+          rotary ? unit::deg : unit::mm, Range{0.01, 360}, "axis travel per motor turn");
+    visit(rotary ? "torque_limit_Nm" : "force_limit_N", p.force_limit,
+          rotary ? unit::newton_m : unit::newton, Range{0.1, 1e6}, "largest drive force, load side");
+  }
+
+  /// Motor inertia seen from the load: J_m (2 pi / travel_per_turn)^2 [kg or kg m^2].
+  double reflected_inertia() const {
+    const double turns = 2 * kPi / travel_per_turn;
+    return motor_inertia * turns * turns;
+  }
+  double total_inertia() const { return load + reflected_inertia(); }
+};
+
+struct AxisParams {
+  AxisLimits limits;
+  ServoParams servo;
+  MechanicsParams mechanics;
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit, bool rotary) {
+    AxisLimits::fields(p.limits, visit, rotary);
+    ServoParams::fields(p.servo, visit);
+    MechanicsParams::fields(p.mechanics, visit, rotary);
+  }
+};
+
+struct SpindleParams {
+  double max_speed = 12000 * unit::rpm.to_si;  ///< [rad/s]
+  double acceleration = 400;                   ///< [rad/s^2]
+  double orient_angle = 0;                     ///< M19 position [rad]
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    visit("max_speed_rpm", p.max_speed, unit::rpm, Range{1, 200000}, "largest spindle speed");
+    visit("acceleration_rad_s2", p.acceleration, Unit{"rad_s2", 1}, Range{1, 1e5}, "spindle acceleration");
+    visit("orient_angle_deg", p.orient_angle, unit::deg, Range{-360, 360}, "M19 position");
+  }
+};
+
+/// Scanning probe and its acquisition module. Equations: model/probe/*.hpp.
+struct ProbeParams {
+  enum class Mounting { vertical, horizontal };
+  enum class Correction { off, heydemann };
+  bool in_spindle = true;          ///< locks out M3/M4
+  double ball_radius = 3e-3;
+  double length = 0.150;           ///< gauge line to ball centre: the tool length of the probe
+  double spring_rate = 1324;       ///< [N/m], 135 gf/mm
+  double moving_mass = 0.055;
+  double stylus_mass = 0.010;
+  double damping_ratio = 0.3;
+  Mounting mounting = Mounting::vertical;
+  double range = 2.0e-3;           ///< measuring range each side, before the shift by gravity
+  double overtravel_lateral = 18e-3;
+  double overtravel_axial = 5e-3;
+  double overtravel_force_lateral = 20;
+  double overtravel_force_axial = 400;
+  double signal_period = 20e-6;
+  int adc_bits = 16;
+  Correction correction = Correction::off;
+  double min_deflection = 10e-6;   ///< below it there is no belief in contact
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    visit("in_spindle", p.in_spindle, "the probe is in the spindle: M3 and M4 are locked out");
+    visit("ball_radius_mm", p.ball_radius, unit::mm, Range{0.1, 20}, "stylus ball radius");
+    visit("length_mm", p.length, unit::mm, Range{10, 1000}, "spindle gauge line to ball centre");
+    visit("spring_rate_N_per_mm", p.spring_rate, unit::n_per_mm, Range{0.01, 100}, "suspension stiffness");
+    visit("moving_mass_g", p.moving_mass, unit::g, Range{1, 1000}, "moving mass without stylus");
+    visit("stylus_mass_g", p.stylus_mass, unit::g, Range{0.1, 500}, "stylus mass");
+    visit("damping_ratio", p.damping_ratio, unit::none, Range{0, 2}, "of the suspension in free air");
+    visit.choice("mounting", p.mounting,
+                 {{"vertical", Mounting::vertical}, {"horizontal", Mounting::horizontal}},
+                 "how the probe hangs: gravity shifts its range");
+    visit("range_mm", p.range, unit::mm, Range{0.1, 20}, "measuring range each side, unloaded");
+    visit("overtravel_lateral_mm", p.overtravel_lateral, unit::mm, Range{0.1, 50},
+          "lateral deflection that trips the overtravel protection");
+    visit("overtravel_axial_mm", p.overtravel_axial, unit::mm, Range{0.1, 50},
+          "axial deflection that trips the overtravel protection");
+    visit("overtravel_force_lateral_N", p.overtravel_force_lateral, unit::newton, Range{0.1, 1000},
+          "lateral force that trips the overtravel protection");
+    visit("overtravel_force_axial_N", p.overtravel_force_axial, unit::newton, Range{0.1, 5000},
+          "axial force that trips the overtravel protection");
+    visit("signal_period_um", p.signal_period, unit::um, Range{0.1, 1000}, "period of the sin/cos signals");
+    visit("adc_bits", p.adc_bits, Range{12, 16}, "converter resolution, 12 or 16");
+    visit.choice("correction", p.correction,
+                 {{"off", Correction::off}, {"heydemann", Correction::heydemann}},
+                 "online correction of the sin/cos signals");
+    visit("min_deflection_um", p.min_deflection, unit::um, Range{1, 1000},
+          "smallest deflection that counts as contact");
+  }
+};
+
+struct BusParams {
+  double nominal_bit_rate = 1e6;  ///< [bit/s] arbitration phase
+  double data_bit_rate = 5e6;     ///< [bit/s] data phase
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    visit("nominal_Mbit_s", p.nominal_bit_rate, unit::mbit_s, Range{0.125, 1}, "arbitration bit rate");
+    visit("data_Mbit_s", p.data_bit_rate, unit::mbit_s, Range{0.125, 8}, "CAN FD data bit rate");
+  }
+};
+
+/// What the NC unit knows besides the axes.
+struct NcParams {
+  double blend_tolerance = 10e-6;      ///< G64 without P [m]
+  double angle_tolerance = 0.01 * kDegree;  ///< orientation tolerance of blends [rad]
+  double rapid_limit = 1.0;            ///< share of the axis limits used by G0
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    visit("blend_tolerance_um", p.blend_tolerance, unit::um, Range{0.1, 1000}, "tip tolerance of G64 without P");
+    visit("angle_tolerance_deg", p.angle_tolerance, unit::deg, Range{1e-5, 1}, "orientation tolerance of blends");
+    visit("rapid_limit", p.rapid_limit, unit::none, Range{0.01, 1}, "share of the axis limits used by G0");
+  }
+};
+
+/// Workpiece, work offsets, tool lengths and what the evaluation needs.
+struct SetupParams {
+  std::string piece;                          ///< path of a piece file; empty: no workpiece
+  std::array<Vec3, 6> work_offset{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(),
+                                  Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};  ///< G54..G59 [m]
+  std::vector<double> tool_length;            ///< H1, H2, ... [m]; the probe is H1 when empty
+  double predeflection = 0.5e-3;              ///< programmed interference with the piece
+  double tolerance = 50e-6;                   ///< verdict: |e_n| must stay within
+  double bin_length = 1e-3;                   ///< arc-length bins of the coverage
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    visit("piece", p.piece, "piece file, relative to this file; empty: nothing to touch");
+    constexpr std::array<const char*, 6> keys{"g54_mm", "g55_mm", "g56_mm", "g57_mm", "g58_mm", "g59_mm"};
+    for (std::size_t i = 0; i < keys.size(); ++i)
+      visit(keys[i], p.work_offset[i], unit::mm, Range{-1e4, 1e4}, "work offset, machine frame at A = C = 0");
+    visit("tool_length_mm", p.tool_length, unit::mm, Range{0, 1000}, "tool lengths H1, H2, ...; H1 is the probe's length when empty");
+    visit("predeflection_mm", p.predeflection, unit::mm, Range{0.01, 5},
+          "how deep the program drives the ball into the piece");
+    visit("tolerance_um", p.tolerance, unit::um, Range{0.1, 10000}, "verdict: |e_n| must stay within");
+    visit("bin_length_mm", p.bin_length, unit::mm, Range{0.05, 100}, "arc-length bins of the coverage");
+  }
+};
+
+// ---------------------------------------------------------------------------------- effects
+
+struct BacklashParams {
+  double gap = 0;  ///< [m or rad]
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit, bool rotary) {
+    visit(rotary ? "gap_arcsec" : "gap_um", p.gap, rotary ? unit::arcsec : unit::um, Range{0, 2000},
+          "lost motion between motor and load");
+  }
+};
+
+/// Wind-up of screw, nut and bearings (or of the gear): a spring between motor and load.
+struct WindupParams {
+  double compliance = 0;        ///< [m/N] or [rad/(N m)]; 0 = rigid
+  double damping_ratio = 0.05;  ///< of the free resonance
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit, bool rotary) {
+    visit(rotary ? "compliance_urad_per_Nm" : "compliance_nm_per_N", p.compliance,
+          rotary ? Unit{"urad_per_Nm", 1e-6} : Unit{"nm_per_N", 1e-9}, Range{0, 1000},
+          "elastic compliance between motor and load, 0 = rigid");
+    visit("damping_ratio", p.damping_ratio, unit::none, Range{0, 1}, "of the free resonance");
+  }
+};
+
+/// Guideway friction on the load. Equations: model/drive/friction.hpp.
+struct FrictionParams {
+  double coulomb = 0;               ///< Fc [N or N m]
+  double breakaway = 0;             ///< Fs, at least Fc to have an effect
+  double stribeck_velocity = 2e-3;  ///< [m/s or rad/s]
+  double viscous = 0;               ///< [N s/m or N m s/rad]
+  double presliding_stiffness = 0;  ///< LuGre sigma0; 0 = static Stribeck law
+  double presliding_damping = 0;    ///< LuGre sigma1
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit, bool rotary) {
+    const Unit force = rotary ? unit::newton_m : unit::newton;
+    visit(rotary ? "coulomb_Nm" : "coulomb_N", p.coulomb, force, Range{0, 1e5}, "sliding friction");
+    visit(rotary ? "breakaway_Nm" : "breakaway_N", p.breakaway, force, Range{0, 1e5},
+          "friction at rest; counts where it exceeds the sliding friction");
+    visit(rotary ? "stribeck_velocity_deg_s" : "stribeck_velocity_mm_s", p.stribeck_velocity,
+          rotary ? unit::deg_s : unit::mm_s, Range{1e-3, 1000}, "velocity over which break-away fades");
+    visit(rotary ? "viscous_Nms_per_rad" : "viscous_Ns_per_m", p.viscous,
+          rotary ? unit::nm_s_per_rad : unit::n_s_per_m, Range{0, 1e6}, "viscous friction");
+    visit(rotary ? "presliding_stiffness_Nm_per_rad" : "presliding_stiffness_N_per_um",
+          p.presliding_stiffness, rotary ? unit::nm_per_rad : unit::n_per_um, Range{0, 1e9},
+          "LuGre bristle stiffness, 0 = no pre-sliding");
+    visit(rotary ? "presliding_damping_Nms_per_rad" : "presliding_damping_Ns_per_m",
+          p.presliding_damping, rotary ? unit::nm_s_per_rad : unit::n_s_per_m, Range{0, 1e8},
+          "LuGre bristle damping");
+  }
+};
+
+struct EncoderParams {
+  double quantum = 0;  ///< [m or rad]; 0 = continuous
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit, bool rotary) {
+    visit(rotary ? "quantum_arcsec" : "quantum_nm", p.quantum, rotary ? unit::arcsec : unit::nm,
+          Range{0, 1e5}, "resolution of the measuring system, 0 = continuous");
+  }
+};
+
+struct AxisEffects {
+  BacklashParams backlash;
+  WindupParams windup;
+  FrictionParams friction;
+  EncoderParams encoder;
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit, bool rotary) {
+    visit.group("backlash", p.backlash, "lost motion", rotary);
+    visit.group("windup", p.windup, "elastic wind-up", rotary);
+    visit.group("friction", p.friction, "guideway friction", rotary);
+    visit.group("encoder", p.encoder, "measuring system", rotary);
+  }
+};
+
+/// Probe and acquisition effects; three-component members are for the probe's x, y, z channels.
+struct ProbeEffects {
+  double surface_friction = 0;        ///< Coulomb coefficient between ball and piece
+  double return_to_zero = 0;          ///< half width of the hysteresis of the suspension [m]
+  Vec3 cos_offset = Vec3::Zero();     ///< share of the amplitude
+  Vec3 sin_offset = Vec3::Zero();     ///< share of the amplitude
+  Vec3 sin_gain = Vec3::Zero();       ///< amplitude of sin over amplitude of cos, minus one
+  Vec3 phase = Vec3::Zero();          ///< quadrature error [rad]
+  double adc_noise = 0;               ///< [V] rms
+  double adc_jitter = 0;              ///< [s] rms
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    visit("surface_friction", p.surface_friction, unit::none, Range{0, 1}, "Coulomb friction of ball on piece");
+    visit("return_to_zero_um", p.return_to_zero, unit::um, Range{0, 50}, "hysteresis of the suspension");
+    visit("cos_offset_percent", p.cos_offset, Unit{"percent", 0.01}, Range{-50, 50}, "offset of cos, of its amplitude");
+    visit("sin_offset_percent", p.sin_offset, Unit{"percent", 0.01}, Range{-50, 50}, "offset of sin, of its amplitude");
+    visit("sin_gain_percent", p.sin_gain, Unit{"percent", 0.01}, Range{-50, 50}, "amplitude of sin against cos");
+    visit("phase_deg", p.phase, unit::deg, Range{-30, 30}, "quadrature error");
+    visit("adc_noise_mV", p.adc_noise, unit::mv, Range{0, 100}, "converter noise, rms");
+    visit("adc_jitter_us", p.adc_jitter, unit::us, Range{0, 50}, "sampling jitter, rms");
+  }
+};
+
+struct Effects {
+  PerAxis<AxisEffects> axis;
+  ProbeEffects probe;
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      visit.group(kAxisNames[i], p.axis[i], "effects of one axis", is_rotary(i));
+    visit.group("probe", p.probe, "probe and acquisition effects");
+  }
+};
+
+// ---------------------------------------------------------------------------------- machine
+
+struct Machine {
+  std::string name = "unnamed";
+  KinematicsParams kinematics;
+  PerAxis<AxisParams> axes;
+  SpindleParams spindle;
+  ProbeParams probe;
+  BusParams bus;
+  NcParams nc;
+  SetupParams setup;
+  Effects effects;
+
+  Machine();  ///< sensible limits and masses for every axis
+
+  /// Length offset H = 1, 2, ...; 0 gives 0. Throws std::out_of_range for an unknown H.
+  double tool_length(int h) const;
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    visit("name", p.name, "shown in reports");
+    visit.group("kinematics", p.kinematics, "how the rotary axes are carried");
+    visit.section("axes", "the five axes", [&](auto& axes) {
+      for (std::size_t i = 0; i < kAxisCount; ++i)
+        axes.group(kAxisNames[i], p.axes[i], "one axis", is_rotary(i));
+    });
+    visit.group("spindle", p.spindle, "spindle drive");
+    visit.group("probe", p.probe, "scanning probe and acquisition module");
+    visit.group("bus", p.bus, "field bus");
+    visit.group("nc", p.nc, "NC unit");
+    visit.group("setup", p.setup, "workpiece, offsets, evaluation");
+    visit.group("effects", p.effects, "what a real machine does besides");
+  }
+};
+
+/// The machine as declared: the same machine with every effect at its null value.
+Machine declared(Machine machine);
+
+}  // namespace vcnc
