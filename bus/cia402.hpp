@@ -13,7 +13,7 @@ enum class State : std::uint8_t {
 inline constexpr std::uint16_t kDisableVoltage = 0x00, kQuickStop = 0x02, kShutdown = 0x06,
                                kSwitchOn = 0x07, kEnable = 0x0f, kFaultReset = 0x80;
 // Extra status bits
-inline constexpr std::uint16_t kWarning = 0x80, kRemote = 0x200, kInternalLimit = 0x800,
+inline constexpr std::uint16_t kWarning = 0x80, kRemote = 0x200, kTargetReached = 0x400, kInternalLimit = 0x800,
                                kFollowsCommand = 0x1000, kFollowingError = 0x2000;
 
 /// State shown by a statusword (object 6041h).

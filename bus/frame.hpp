@@ -1,6 +1,7 @@
 // A CAN or CAN FD data frame with an 11-bit identifier, as a value.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -24,12 +25,14 @@ struct Frame {
 /// Whether `len` is a payload length a frame of this kind can carry.
 constexpr bool valid_length(int len, bool fd) {
   if (len >= 0 && len <= 8) return true;
-  return fd && (len == 12 || len == 16 || len == 20 || len == 24 || len == 32 || len == 48 || len == 64);
+  return fd && (len == 12 || len == 16 || len == 20 || len == 24 || len == 32 || len == 48 ||
+                len == 64);
 }
 
 using Frames = std::vector<Frame>;
 
-/// Order in which frames of one cycle act and are logged: by identifier; equal ones keep their order.
+/// Order in which frames of one cycle act and are logged: by identifier; equal ones keep their
+/// order. Does not allocate.
 void sort_by_id(Frames& frames);
 
 }  // namespace vcnc

@@ -2,7 +2,9 @@
 //
 // One table per message in messages.cpp (offset, width, scale) is the only place that knows byte
 // positions. All numbers are little-endian. Positions travel as 48-bit integers of 0.1 nm or
-// 1e-10 rad, velocities as 32-bit integers of 10 nm/s or 1e-8 rad/s; the codec saturates at the ends.
+// 1e-10 rad, velocities as 32-bit integers of 10 nm/s or 1e-8 rad/s, spindle speeds in 1e-5 rad/s.
+// The codec saturates at the ends, which are symmetric; the most negative code says "not a number" and
+// is decoded as such, so a value that is none cannot pass for a position. Bytes without a field are 0.
 //
 //   COB-ID    sender      bytes  message
 //   000       NC unit     2      NMT command
@@ -30,8 +32,12 @@ inline constexpr std::uint16_t kNmtId = 0x000, kSyncId = 0x080, kEmcyBase = 0x08
 inline constexpr int kSpindleNode = 6, kProbeNode = 7, kOvertravelNode = 8;
 constexpr int drive_node(std::size_t axis) { return static_cast<int>(axis) + 1; }
 
-enum class NmtCommand : std::uint8_t { start = 0x01, stop = 0x02, preop = 0x80, reset_node = 0x81, reset_comm = 0x82 };
-enum class NmtState : std::uint8_t { boot_up = 0x00, stopped = 0x04, operational = 0x05, pre_operational = 0x7f };
+enum class NmtCommand : std::uint8_t {
+  start = 0x01, stop = 0x02, preop = 0x80, reset_node = 0x81, reset_comm = 0x82
+};
+enum class NmtState : std::uint8_t {
+  boot_up = 0x00, stopped = 0x04, operational = 0x05, pre_operational = 0x7f
+};
 
 struct Nmt {
   NmtCommand command = NmtCommand::start;
@@ -74,7 +80,7 @@ struct DriveStatus {
   std::uint16_t tick = 0;
   std::uint16_t statusword = 0;    ///< CiA 402
   double position = 0;             ///< measured at the end of the cycle [m or rad]; spindle: angle
-  double second_encoder = 0;       ///< load side minus motor side [m or rad]; spindle: speed [rad/s]
+  double second_encoder = 0;       ///< load minus motor side [m or rad]; spindle: speed [rad/s]
   double force = 0;                ///< share of the force limit, -3.2..3.2
 };
 
@@ -98,7 +104,8 @@ struct OvertravelState {
 };
 
 // ------------------------------------------------------------------ codecs
-// encode() never fails: values saturate. decode_x() gives nothing for a wrong id or length.
+// encode() never fails: values saturate. decode_x() gives nothing for a wrong identifier, a wrong length
+// or a code of an enumeration that does not exist.
 Frame encode(const Nmt&);
 Frame encode(const Sync&);
 Frame encode(const Heartbeat&);

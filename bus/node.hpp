@@ -19,7 +19,9 @@ class Node {
   virtual ~Node() = default;
   virtual int id() const = 0;                          ///< CANopen node id, 1..127
   virtual std::string_view name() const = 0;           ///< for people: "drive X", "probe"
-  virtual bool accepts(std::uint16_t cob_id) const = 0;  ///< acceptance filter
+  /// Acceptance filter; asked once for every identifier, so it must not change. NMT, SYNC and
+  /// heartbeats never reach a node: NodeShell handles them.
+  virtual bool accepts(std::uint16_t cob_id) const = 0;
   /// One cycle. `inputs` are the accepted frames of cycle k-1 in CAN-ID order; answers are appended
   /// to `out` and must begin with the node's cyclic frame (COB-ID 180h + id).
   virtual void step(Tick k, std::span<const Frame> inputs, Frames& out) = 0;
@@ -32,6 +34,8 @@ class Master {
   /// Ends cycle k: `answers` holds every node's frames of cycle k in CAN-ID order; commands for
   /// cycle k+1 are appended to `out`. Returns false when the run is over.
   virtual bool step(Tick k, std::span<const Frame> answers, Frames& out) = 0;
+  /// Told before step(k): the share of the last complete cycle (k-1) in which the bus was busy.
+  virtual void cycle_load(double /*share*/) {}
 };
 
 }  // namespace vcnc

@@ -17,20 +17,20 @@ namespace vcnc {
 
 /// One instant. Plain numbers in SI units; kChannels names each of them.
 struct TelemetryRow {
-  double tick = 0;                      ///< instant t = tick * 1 ms, exact integer
-  double line = 0;                      ///< program line being executed
-  double state = 0;                     ///< NcState
-  double feed = 0;                      ///< commanded tool-tip speed [m/s]
-  std::array<double, 5> q_cmd{};        ///< commanded axis positions [m, rad]
-  std::array<double, 5> q_act{};        ///< measured axis positions [m, rad]
-  std::array<double, 5> q_second{};     ///< load minus motor side [m, rad]
-  std::array<double, 5> force{};        ///< share of the force limit
-  std::array<double, 3> deflection{};   ///< probe frame [m]
-  std::array<double, 6> adc{};          ///< raw sin/cos codes
-  double probe_flags = 0;               ///< ProbeSample::Flag
-  double overtravel = 0;                ///< OvertravelState::State
-  double spindle_speed = 0;             ///< [rad/s]
-  double bus_load = 0;                  ///< share of the cycle the bus was busy
+  double tick = 0;                     ///< instant t = tick * 1 ms, exact integer
+  double line = 0;                     ///< program line being executed
+  double state = 0;                    ///< NcState
+  double feed = 0;                     ///< commanded tool-tip speed [m/s]
+  std::array<double, 5> q_cmd{};       ///< commanded axis positions [m, rad]
+  std::array<double, 5> q_act{};       ///< measured axis positions [m, rad]
+  std::array<double, 5> q_second{};    ///< load minus motor side [m, rad]
+  std::array<double, 5> force{};       ///< share of the force limit
+  std::array<double, 3> deflection{};  ///< probe frame [m]
+  std::array<double, 6> adc{};         ///< raw sin/cos codes
+  double probe_flags = 0;              ///< ProbeSample::Flag
+  double overtravel = 0;               ///< OvertravelState::State
+  double spindle_speed = 0;            ///< [rad/s]
+  double bus_load = 0;                 ///< share of the cycle the bus was busy
 };
 
 inline constexpr std::size_t kRowWidth = sizeof(TelemetryRow) / sizeof(double);
@@ -53,7 +53,7 @@ struct Alarm {
 
 /// What is known when a run begins.
 struct RunBegin {
-  std::string run_id;         ///< unique per run
+  std::string run_id;  ///< unique per run
   std::string program_name;
   std::string declared_toml;  ///< the declared machine, resolved, as TOML
   std::string piece_toml;     ///< the workpiece as TOML; empty: none
@@ -62,13 +62,13 @@ struct RunBegin {
 
 /// What is known when it ends. The defaults say "interrupted".
 struct RunEnd {
-  bool complete = false;          ///< the program came to its end
+  bool complete = false;  ///< the program came to its end
   std::string reason = "interrupted";
   std::int64_t cycles = 0;
-  std::string trace_hash;         ///< over every frame of every cycle
-  double wall_seconds = 0;        ///< host time; never part of a result
-  double bus_load_worst = 0;      ///< largest share of a cycle the bus was busy
-  std::uint64_t gaps = 0;         ///< rows that were lost on the way, or frames lost on the bus
+  std::string trace_hash;     ///< over every frame of every cycle
+  double wall_seconds = 0;    ///< host time; never part of a result
+  double bus_load_worst = 0;  ///< largest share of a cycle the bus was busy
+  std::uint64_t gaps = 0;     ///< rows that were lost on the way, or frames lost on the bus
 };
 
 class TelemetrySink {

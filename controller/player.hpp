@@ -2,37 +2,32 @@
 #pragma once
 
 #include <memory>
-#include <stdexcept>
 #include <string>
 
+#include "controller/program_error.hpp"
 #include "model/axes.hpp"
+#include "model/input_error.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {
 
-/// A program that cannot be run: "FILE:LINE: reason", naming the word.
-class ProgramError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
 /// What the machine shall do in one cycle.
 struct PlayerStep {
   enum class Spindle { off, clockwise, counter_clockwise, orient };
-  AxisVector position{};   ///< axis positions at the end of the cycle [m, rad]
-  AxisVector velocity{};   ///< their velocities there
-  double feed = 0;         ///< commanded speed of the controlled point [m/s]
-  int line = 0;            ///< program line (1-based line of the file)
+  AxisVector position{};  ///< axis positions at the end of the cycle [m, rad]
+  AxisVector velocity{};  ///< their velocities there
+  double feed = 0;        ///< commanded speed of the controlled point [m/s]
+  int line = 0;           ///< program line (1-based line of the file)
   Spindle spindle = Spindle::off;
   double spindle_speed = 0;  ///< [rad/s]
-  bool dwell = false;      ///< G4, M0 or waiting for the spindle
-  bool done = false;       ///< M2/M30 reached, axes at rest
+  bool dwell = false;        ///< G4, M0 or waiting for the spindle
+  bool done = false;         ///< M2/M30 reached, axes at rest
 };
 
 class Player {
  public:
-  /// Reads and checks the whole program before anything moves: syntax, unknown words, axis limits of
-  /// end points, missing feed, ... Throws ProgramError.
+  /// Reads and checks the whole program before anything moves: syntax, unknown words, axis limits
+  /// of end points, missing feed, ... Throws ProgramError.
   Player(const std::string& path, const Machine& machine);
   ~Player();
 

@@ -8,8 +8,10 @@ Machine::Machine() {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     AxisParams& axis = axes[i];
     if (!is_rotary(i)) continue;
-    axis.limits = {.min = -2 * kPi, .max = 2 * kPi, .velocity = 3.5, .acceleration = 15, .jerk = 150};
-    axis.mechanics = {.load = 2, .motor_inertia = 0.5, .travel_per_turn = 2 * kPi, .force_limit = 500};
+    axis.limits = {
+        .min = -2 * kPi, .max = 2 * kPi, .velocity = 3.5, .acceleration = 15, .jerk = 150};
+    axis.mechanics = {
+        .load = 2, .motor_inertia = 0.5, .travel_per_turn = 2 * kPi, .force_limit = 500};
     effects.axis[i].friction.stribeck_velocity = 0.02;
   }
 }

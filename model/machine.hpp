@@ -1,8 +1,8 @@
 // The machine as data: every parameter a machine file may hold.
 //
-// What stands outside `effects` is the declared machine: what its builder says it is. `effects` holds
-// what a real machine does besides; every effect is absent by default (its null value), so that a
-// file without an [effects] table is the ideal machine. The analysis is only ever given the
+// What stands outside `effects` is the declared machine: what its builder says it is. `effects`
+// holds what a real machine does besides; every effect is absent by default (its null value), so
+// that a file without an [effects] table is the ideal machine. The analysis is only ever given the
 // declared part (see declared()).
 #pragma once
 
@@ -48,28 +48,30 @@ struct AxisLimits {
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit, bool rotary) {
     const Range any{-1e6, 1e6}, positive{1e-3, 1e7};
-    visit(rotary ? "min_deg" : "min_mm", p.min, rotary ? unit::deg : unit::mm, any, "lower travel limit");
-    visit(rotary ? "max_deg" : "max_mm", p.max, rotary ? unit::deg : unit::mm, any, "upper travel limit");
+    visit(rotary ? "min_deg" : "min_mm", p.min, rotary ? unit::deg : unit::mm, any,
+          "lower travel limit");
+    visit(rotary ? "max_deg" : "max_mm", p.max, rotary ? unit::deg : unit::mm, any,
+          "upper travel limit");
     visit(rotary ? "start_deg" : "start_mm", p.start, rotary ? unit::deg : unit::mm, any,
           "position at switch-on; also the G28 reference position");
-    visit(rotary ? "velocity_deg_s" : "velocity_mm_s", p.velocity, rotary ? unit::deg_s : unit::mm_s,
-          positive, "largest velocity");
+    visit(rotary ? "velocity_deg_s" : "velocity_mm_s", p.velocity,
+          rotary ? unit::deg_s : unit::mm_s, positive, "largest velocity");
     visit(rotary ? "acceleration_deg_s2" : "acceleration_mm_s2", p.acceleration,
           rotary ? unit::deg_s2 : unit::mm_s2, positive, "largest acceleration");
-    visit(rotary ? "jerk_deg_s3" : "jerk_mm_s3", p.jerk, rotary ? unit::deg_s3 : unit::mm_s3, positive,
-          "largest jerk");
+    visit(rotary ? "jerk_deg_s3" : "jerk_mm_s3", p.jerk, rotary ? unit::deg_s3 : unit::mm_s3,
+          positive, "largest jerk");
   }
 };
 
 /// Cascade of one drive. Equations: model/drive/axis_drive.hpp.
 struct ServoParams {
   enum class Feedback { motor, load };
-  double kv_per_s = 40;           ///< position loop gain
-  double velocity_bandwidth = 80; ///< velocity loop crossover [Hz]; Kp = 2 pi f J
-  double integral_time = 0.010;   ///< velocity loop integral time Ti [s]
-  double velocity_ff = 1;         ///< 1 = full velocity feed-forward
-  double acceleration_ff = 1;     ///< 1 = full acceleration feed-forward
-  double current_lag = 0;         ///< first-order lag of the force/torque [s]
+  double kv_per_s = 40;            ///< position loop gain
+  double velocity_bandwidth = 80;  ///< velocity loop crossover [Hz]; Kp = 2 pi f J
+  double integral_time = 0.010;    ///< velocity loop integral time Ti [s]
+  double velocity_ff = 1;          ///< 1 = full velocity feed-forward
+  double acceleration_ff = 1;      ///< 1 = full acceleration feed-forward
+  double current_lag = 0;          ///< first-order lag of the force/torque [s]
   Feedback feedback = Feedback::load;
 
   template <class Self, class Visit>
@@ -77,7 +79,8 @@ struct ServoParams {
     visit("kv_per_s", p.kv_per_s, unit::per_s, Range{0.1, 1000}, "position loop gain");
     visit("velocity_bandwidth_Hz", p.velocity_bandwidth, unit::hz, Range{1, 1000},
           "velocity loop crossover frequency");
-    visit("integral_time_ms", p.integral_time, unit::ms, Range{0.5, 10000}, "velocity loop integral time");
+    visit("integral_time_ms", p.integral_time, unit::ms, Range{0.5, 10000},
+          "velocity loop integral time");
     visit("velocity_ff", p.velocity_ff, unit::none, Range{0, 2}, "velocity feed-forward, 1 = full");
     visit("acceleration_ff", p.acceleration_ff, unit::none, Range{0, 2},
           "acceleration feed-forward, 1 = full");
@@ -89,20 +92,22 @@ struct ServoParams {
 
 /// Moving masses and motor of one drive, SI (kg, N for linear; kg m^2, N m for rotary).
 struct MechanicsParams {
-  double load = 500;            ///< table and what it carries
-  double motor_inertia = 0.01;  ///< motor and screw [kg m^2]
+  double load = 500;               ///< table and what it carries
+  double motor_inertia = 0.01;     ///< motor and screw [kg m^2]
   double travel_per_turn = 0.012;  ///< [m] or [rad] per motor turn
-  double force_limit = 1e4;     ///< largest force or torque, load side
+  double force_limit = 4e4;        ///< largest force or torque, load side
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit, bool rotary) {
-    visit(rotary ? "load_kgm2" : "load_kg", p.load, rotary ? unit::kgm2 : unit::kg, Range{1e-4, 1e5},
-          "moving mass or inertia on the load side");
-    visit("motor_inertia_kgm2", p.motor_inertia, unit::kgm2, Range{0, 100}, "motor and screw inertia");
+    visit(rotary ? "load_kgm2" : "load_kg", p.load, rotary ? unit::kgm2 : unit::kg,
+          Range{1e-4, 1e5}, "moving mass or inertia on the load side");
+    visit("motor_inertia_kgm2", p.motor_inertia, unit::kgm2, Range{0, 100},
+          "motor and screw inertia");
     visit(rotary ? "travel_per_turn_deg" : "travel_per_turn_mm", p.travel_per_turn,
           rotary ? unit::deg : unit::mm, Range{0.01, 360}, "axis travel per motor turn");
     visit(rotary ? "torque_limit_Nm" : "force_limit_N", p.force_limit,
-          rotary ? unit::newton_m : unit::newton, Range{0.1, 1e6}, "largest drive force, load side");
+          rotary ? unit::newton_m : unit::newton, Range{0.1, 1e6},
+          "largest drive force, load side");
   }
 
   /// Motor inertia seen from the load: J_m (2 pi / travel_per_turn)^2 [kg or kg m^2].
@@ -134,7 +139,8 @@ struct SpindleParams {
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit) {
     visit("max_speed_rpm", p.max_speed, unit::rpm, Range{1, 200000}, "largest spindle speed");
-    visit("acceleration_rad_s2", p.acceleration, Unit{"rad_s2", 1}, Range{1, 1e5}, "spindle acceleration");
+    visit("acceleration_rad_s2", p.acceleration, Unit{"rad_s2", 1}, Range{1, 1e5},
+          "spindle acceleration");
     visit("orient_angle_deg", p.orient_angle, unit::deg, Range{-360, 360}, "M19 position");
   }
 };
@@ -143,15 +149,15 @@ struct SpindleParams {
 struct ProbeParams {
   enum class Mounting { vertical, horizontal };
   enum class Correction { off, heydemann };
-  bool in_spindle = true;          ///< locks out M3/M4
+  bool in_spindle = true;  ///< locks out M3/M4
   double ball_radius = 3e-3;
-  double length = 0.150;           ///< gauge line to ball centre: the tool length of the probe
-  double spring_rate = 1324;       ///< [N/m], 135 gf/mm
+  double length = 0.150;      ///< gauge line to ball centre: the tool length of the probe
+  double spring_rate = 1324;  ///< [N/m], 135 gf/mm
   double moving_mass = 0.055;
   double stylus_mass = 0.010;
   double damping_ratio = 0.3;
   Mounting mounting = Mounting::vertical;
-  double range = 2.0e-3;           ///< measuring range each side, before the shift by gravity
+  double range = 2.0e-3;  ///< measuring range each side, before the shift by gravity
   double overtravel_lateral = 18e-3;
   double overtravel_axial = 5e-3;
   double overtravel_force_lateral = 20;
@@ -159,17 +165,19 @@ struct ProbeParams {
   double signal_period = 20e-6;
   int adc_bits = 16;
   Correction correction = Correction::off;
-  double min_deflection = 10e-6;   ///< below it there is no belief in contact
+  double min_deflection = 10e-6;  ///< below it there is no belief in contact
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit) {
     visit("in_spindle", p.in_spindle, "the probe is in the spindle: M3 and M4 are locked out");
     visit("ball_radius_mm", p.ball_radius, unit::mm, Range{0.1, 20}, "stylus ball radius");
     visit("length_mm", p.length, unit::mm, Range{10, 1000}, "spindle gauge line to ball centre");
-    visit("spring_rate_N_per_mm", p.spring_rate, unit::n_per_mm, Range{0.01, 100}, "suspension stiffness");
+    visit("spring_rate_N_per_mm", p.spring_rate, unit::n_per_mm, Range{0.01, 100},
+          "suspension stiffness");
     visit("moving_mass_g", p.moving_mass, unit::g, Range{1, 1000}, "moving mass without stylus");
     visit("stylus_mass_g", p.stylus_mass, unit::g, Range{0.1, 500}, "stylus mass");
-    visit("damping_ratio", p.damping_ratio, unit::none, Range{0, 2}, "of the suspension in free air");
+    visit("damping_ratio", p.damping_ratio, unit::none, Range{0, 2},
+          "of the suspension in free air");
     visit.choice("mounting", p.mounting,
                  {{"vertical", Mounting::vertical}, {"horizontal", Mounting::horizontal}},
                  "how the probe hangs: gravity shifts its range");
@@ -182,7 +190,8 @@ struct ProbeParams {
           "lateral force that trips the overtravel protection");
     visit("overtravel_force_axial_N", p.overtravel_force_axial, unit::newton, Range{0.1, 5000},
           "axial force that trips the overtravel protection");
-    visit("signal_period_um", p.signal_period, unit::um, Range{0.1, 1000}, "period of the sin/cos signals");
+    visit("signal_period_um", p.signal_period, unit::um, Range{0.1, 1000},
+          "period of the sin/cos signals");
     visit("adc_bits", p.adc_bits, Range{12, 16}, "converter resolution, 12 or 16");
     visit.choice("correction", p.correction,
                  {{"off", Correction::off}, {"heydemann", Correction::heydemann}},
@@ -198,46 +207,55 @@ struct BusParams {
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit) {
-    visit("nominal_Mbit_s", p.nominal_bit_rate, unit::mbit_s, Range{0.125, 1}, "arbitration bit rate");
+    visit("nominal_Mbit_s", p.nominal_bit_rate, unit::mbit_s, Range{0.125, 1},
+          "arbitration bit rate");
     visit("data_Mbit_s", p.data_bit_rate, unit::mbit_s, Range{0.125, 8}, "CAN FD data bit rate");
   }
 };
 
 /// What the NC unit knows besides the axes.
 struct NcParams {
-  double blend_tolerance = 10e-6;      ///< G64 without P [m]
+  double blend_tolerance = 10e-6;           ///< G64 without P [m]
   double angle_tolerance = 0.01 * kDegree;  ///< orientation tolerance of blends [rad]
-  double rapid_limit = 1.0;            ///< share of the axis limits used by G0
+  double rapid_limit = 1.0;                 ///< share of the axis limits used by G0
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit) {
-    visit("blend_tolerance_um", p.blend_tolerance, unit::um, Range{0.1, 1000}, "tip tolerance of G64 without P");
-    visit("angle_tolerance_deg", p.angle_tolerance, unit::deg, Range{1e-5, 1}, "orientation tolerance of blends");
-    visit("rapid_limit", p.rapid_limit, unit::none, Range{0.01, 1}, "share of the axis limits used by G0");
+    visit("blend_tolerance_um", p.blend_tolerance, unit::um, Range{0.1, 1000},
+          "tip tolerance of G64 without P");
+    visit("angle_tolerance_deg", p.angle_tolerance, unit::deg, Range{1e-5, 1},
+          "orientation tolerance of blends");
+    visit("rapid_limit", p.rapid_limit, unit::none, Range{0.01, 1},
+          "share of the axis limits used by G0");
   }
 };
 
 /// Workpiece, work offsets, tool lengths and what the evaluation needs.
 struct SetupParams {
-  std::string piece;                          ///< path of a piece file; empty: no workpiece
+  std::string piece;  ///< path of a piece file; empty: no workpiece
   std::array<Vec3, 6> work_offset{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(),
                                   Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};  ///< G54..G59 [m]
-  std::vector<double> tool_length;            ///< H1, H2, ... [m]; the probe is H1 when empty
-  double predeflection = 0.5e-3;              ///< programmed interference with the piece
-  double tolerance = 50e-6;                   ///< verdict: |e_n| must stay within
-  double bin_length = 1e-3;                   ///< arc-length bins of the coverage
+  std::vector<double> tool_length;  ///< H1, H2, ... [m]; the probe is H1 when empty
+  double predeflection = 0.5e-3;    ///< programmed interference with the piece
+  double tolerance = 50e-6;         ///< verdict: |e_n| must stay within
+  double bin_length = 1e-3;         ///< arc-length bins of the coverage
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit) {
     visit("piece", p.piece, "piece file, relative to this file; empty: nothing to touch");
-    constexpr std::array<const char*, 6> keys{"g54_mm", "g55_mm", "g56_mm", "g57_mm", "g58_mm", "g59_mm"};
+    constexpr std::array<const char*, 6> keys{"g54_mm", "g55_mm", "g56_mm",
+                                              "g57_mm", "g58_mm", "g59_mm"};
     for (std::size_t i = 0; i < keys.size(); ++i)
-      visit(keys[i], p.work_offset[i], unit::mm, Range{-1e4, 1e4}, "work offset, machine frame at A = C = 0");
-    visit("tool_length_mm", p.tool_length, unit::mm, Range{0, 1000}, "tool lengths H1, H2, ...; H1 is the probe's length when empty");
+      visit(keys[i], p.work_offset[i], unit::mm, Range{-1e4, 1e4},
+            "work offset, machine frame at A = C = 0");
+    visit("tool_length_mm", p.tool_length, unit::mm, Range{0, 1000},
+          "tool lengths H1, H2, ...; H1 is the probe's length when empty");
     visit("predeflection_mm", p.predeflection, unit::mm, Range{0.01, 5},
           "how deep the program drives the ball into the piece");
-    visit("tolerance_um", p.tolerance, unit::um, Range{0.1, 10000}, "verdict: |e_n| must stay within");
-    visit("bin_length_mm", p.bin_length, unit::mm, Range{0.05, 100}, "arc-length bins of the coverage");
+    visit("tolerance_um", p.tolerance, unit::um, Range{0.1, 10000},
+          "verdict: |e_n| must stay within");
+    visit("bin_length_mm", p.bin_length, unit::mm, Range{0.05, 100},
+          "arc-length bins of the coverage");
   }
 };
 
@@ -280,7 +298,8 @@ struct FrictionParams {
     visit(rotary ? "breakaway_Nm" : "breakaway_N", p.breakaway, force, Range{0, 1e5},
           "friction at rest; counts where it exceeds the sliding friction");
     visit(rotary ? "stribeck_velocity_deg_s" : "stribeck_velocity_mm_s", p.stribeck_velocity,
-          rotary ? unit::deg_s : unit::mm_s, Range{1e-3, 1000}, "velocity over which break-away fades");
+          rotary ? unit::deg_s : unit::mm_s, Range{1e-3, 1000},
+          "velocity over which break-away fades");
     visit(rotary ? "viscous_Nms_per_rad" : "viscous_Ns_per_m", p.viscous,
           rotary ? unit::nm_s_per_rad : unit::n_s_per_m, Range{0, 1e6}, "viscous friction");
     visit(rotary ? "presliding_stiffness_Nm_per_rad" : "presliding_stiffness_N_per_um",
@@ -317,22 +336,27 @@ struct AxisEffects {
 
 /// Probe and acquisition effects; three-component members are for the probe's x, y, z channels.
 struct ProbeEffects {
-  double surface_friction = 0;        ///< Coulomb coefficient between ball and piece
-  double return_to_zero = 0;          ///< half width of the hysteresis of the suspension [m]
-  Vec3 cos_offset = Vec3::Zero();     ///< share of the amplitude
-  Vec3 sin_offset = Vec3::Zero();     ///< share of the amplitude
-  Vec3 sin_gain = Vec3::Zero();       ///< amplitude of sin over amplitude of cos, minus one
-  Vec3 phase = Vec3::Zero();          ///< quadrature error [rad]
-  double adc_noise = 0;               ///< [V] rms
-  double adc_jitter = 0;              ///< [s] rms
+  double surface_friction = 0;     ///< Coulomb coefficient between ball and piece
+  double return_to_zero = 0;       ///< half width of the hysteresis of the suspension [m]
+  Vec3 cos_offset = Vec3::Zero();  ///< share of the amplitude
+  Vec3 sin_offset = Vec3::Zero();  ///< share of the amplitude
+  Vec3 sin_gain = Vec3::Zero();    ///< amplitude of sin over amplitude of cos, minus one
+  Vec3 phase = Vec3::Zero();       ///< quadrature error [rad]
+  double adc_noise = 0;            ///< [V] rms
+  double adc_jitter = 0;           ///< [s] rms
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit) {
-    visit("surface_friction", p.surface_friction, unit::none, Range{0, 1}, "Coulomb friction of ball on piece");
-    visit("return_to_zero_um", p.return_to_zero, unit::um, Range{0, 50}, "hysteresis of the suspension");
-    visit("cos_offset_percent", p.cos_offset, Unit{"percent", 0.01}, Range{-50, 50}, "offset of cos, of its amplitude");
-    visit("sin_offset_percent", p.sin_offset, Unit{"percent", 0.01}, Range{-50, 50}, "offset of sin, of its amplitude");
-    visit("sin_gain_percent", p.sin_gain, Unit{"percent", 0.01}, Range{-50, 50}, "amplitude of sin against cos");
+    visit("surface_friction", p.surface_friction, unit::none, Range{0, 1},
+          "Coulomb friction of ball on piece");
+    visit("return_to_zero_um", p.return_to_zero, unit::um, Range{0, 50},
+          "hysteresis of the suspension");
+    visit("cos_offset_percent", p.cos_offset, Unit{"percent", 0.01}, Range{-50, 50},
+          "offset of cos, of its amplitude");
+    visit("sin_offset_percent", p.sin_offset, Unit{"percent", 0.01}, Range{-50, 50},
+          "offset of sin, of its amplitude");
+    visit("sin_gain_percent", p.sin_gain, Unit{"percent", 0.01}, Range{-50, 50},
+          "amplitude of sin against cos");
     visit("phase_deg", p.phase, unit::deg, Range{-30, 30}, "quadrature error");
     visit("adc_noise_mV", p.adc_noise, unit::mv, Range{0, 100}, "converter noise, rms");
     visit("adc_jitter_us", p.adc_jitter, unit::us, Range{0, 50}, "sampling jitter, rms");

@@ -1,6 +1,7 @@
 // Vectors, rotations and angle constants shared by the physics.
 //
-// Lengths are metres, angles radians, in every function of this project that does not say otherwise.
+// Lengths are metres, angles radians, in every function of this project that does not say
+// otherwise.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,7 +1,7 @@
 // Non-rational B-spline curves in space.
 #pragma once
 
-#include <span>
+#include <cstddef>
 #include <vector>
 
 #include "model/math.hpp"
@@ -9,10 +9,12 @@
 namespace vcnc {
 
 /// C(u) = sum_i N_{i,p}(u) P_i on a non-decreasing knot vector with n + p + 2 knots for n + 1 points.
-/// de Boor's algorithm; source: Piegl, Tiller, The NURBS Book, 2nd ed., ch. 2-3.
+/// Each knot span is turned once into its polynomial about the middle of the span (derivatives of the
+/// basis functions: Piegl, Tiller, The NURBS Book, 2nd ed., A2.3), so that eval() is one Horner scheme.
+/// Degree 1..7.
 class BSplineCurve {
  public:
-  /// Throws std::invalid_argument saying what is wrong (too few points, wrong number of knots,
+  /// Throws std::invalid_argument saying what is wrong (degree, too few points, wrong number of knots,
   /// decreasing knots, a knot repeated more than degree + 1 times, non-finite numbers).
   BSplineCurve(int degree, std::vector<double> knots, std::vector<Vec3> points);
 
@@ -20,13 +22,15 @@ class BSplineCurve {
     Vec3 c, c1, c2;  ///< value, first and second derivative with respect to u
   };
   Point eval(double u) const;  ///< u is clamped to [u_min, u_max]
-  double u_min() const { return knots_[static_cast<std::size_t>(degree_)]; }
-  double u_max() const { return knots_[points_.size()]; }
+  double u_min() const { return breaks_.front(); }
+  double u_max() const { return breaks_.back(); }
+  std::size_t span_count() const { return breaks_.size() - 1; }
 
  private:
   int degree_;
-  std::vector<double> knots_;
-  std::vector<Vec3> points_;
+  std::vector<double> breaks_;       ///< distinct knots from u_min to u_max
+  std::vector<Vec3> coefficients_;   ///< per span: degree + 1 Taylor coefficients about its middle
+  double spans_per_u_;               ///< first guess of the span: exact for uniform knots
 };
 
 }  // namespace vcnc

@@ -27,12 +27,18 @@ struct ToolPose {
   Mat3 R_WT = Mat3::Identity();
 };
 
+/// Positions of the rotary axes [rad].
+struct RotaryPair {
+  double a = 0, c = 0;
+};
+
 class Kinematics {
  public:
   /// `tool_length` L [m]; `p_MW` work offset [m], machine frame at A = C = 0.
   Kinematics(const KinematicsParams& params, double tool_length, const Vec3& p_MW);
 
-  /// Axis positions that put the controlled point at p_WT with the rotary axes at a, c [rad].
+  /// Axis positions that put the controlled point at p_WT with the rotary axes at a, c [rad], as the
+  /// control counts them.
   AxisVector inverse(const Vec3& p_WT, double a, double c) const;
 
   /// Where the controlled point is, and how the tool stands, for axis positions q.
@@ -41,22 +47,25 @@ class Kinematics {
   /// d p_WT / d q: columns per axis, [m/m] and [m/rad].
   Eigen::Matrix<double, 3, 5> jacobian(const AxisVector& q) const;
 
+  /// Between ISO 841 rotary positions (tool_axis, rotary_from_axis) and those the control counts
+  /// (every q, and the a, c of inverse): the signs of a_reversed, c_reversed. Its own inverse.
+  RotaryPair counted(const RotaryPair& iso) const;
+
   double tool_length() const { return tool_length_; }
 
  private:
   KinematicsParams params_;
   double tool_length_;
   Vec3 p_MW_;
+  Vec3 p_AT_;  ///< from the A axis to the controlled point at zero (head)
 };
 
-/// Tool axis in workpiece coordinates for rotary positions a, c [rad].
+/// Tool axis in workpiece coordinates for ISO 841 rotary positions a, c [rad].
 Vec3 tool_axis(double a, double c);
 
-struct RotaryPair {
-  double a = 0, c = 0;
-};
 /// Rotary positions for a unit tool axis d, continuous with `previous` (least |dA| + |dC| over both
-/// solutions and all turns of C). At the pole (sin A < 1e-4) C keeps its previous value.
+/// solutions and all turns of C). At the pole (sin A < 1e-4) C keeps its previous value and A is the
+/// best for it, so the tool axis may be off by at most 1e-4 rad there.
 RotaryPair rotary_from_axis(const Vec3& d, const RotaryPair& previous);
 
 }  // namespace vcnc

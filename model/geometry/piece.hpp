@@ -4,17 +4,24 @@
 // distance(centre) = r. Every piece is a closed form but the ruled rim:
 //
 //   ruled   solid { p : |p - M(u,v)| <= t/2 }, M the mid-surface S(u,v) = (1-v) C0(u) + v C1(u), u in
-//           [u_min, u_max], v in [0, 1]. The faces are the parallel surfaces S +- (t/2) n; the ends are
-//           round caps about the end rulings. Closest point by Newton on
-//           (p - S) . S_u = 0, (p - S) . S_v = 0, started from the previous one.
-//   ring    cylinder about `direction`, probed inside (bore) or outside
-//   sphere, plane, cone
+//           [u_min, u_max], v in [0, 1]. The faces are the parallel surfaces S +- (t/2) n; ends, foot and
+//           crown of the wall are round. See model/geometry/ruled_piece.hpp.
+//   ring    cylinder about `direction` through `centre`, `height` / 2 to either side of it; bore: a hole
+//           in a plate without outer edge; else a boss
+//   sphere  about `centre`
+//   plane   half space below `centre`, outward normal `direction`
+//   cone    frustum on a base of `radius` at `centre`, axis `direction`
+//
+// Height z of a scan path: ruled, sphere and plane - every ball centre has this z (a level plane is
+// scanned along x and has a z of its own). Ring and cone - the path is a circle in the plane normal to
+// the axis through the axis point with this z, which must be within 60 deg of the z axis.
+// A plane is scanned along a straight line of length 2 `radius` about `centre`.
 #pragma once
 
 #include <memory>
 #include <vector>
 
-#include "model/geometry/bspline.hpp"
+#include "model/geometry/ruled_surface.hpp"
 #include "model/math.hpp"
 #include "model/piece_params.hpp"
 
@@ -45,29 +52,14 @@ class Piece {
   virtual SurfacePoint nearest(const Vec3& p, const SurfacePoint& hint) const = 0;
   /// Closed (or, for the plane, open) path of a ball of radius r whose centre keeps the distance
   /// r - interference from the surface, parallel to the base plane at height z (where it applies),
-  /// sampled about every `step` [m]; the last station of a closed path coincides with the first.
-  virtual std::vector<Station> scan_path(double ball_radius, double interference, double z, double step) const = 0;
+  /// with stations no further apart than `step` [m]; the last station of a closed path coincides with
+  /// the first. Throws std::invalid_argument when there is no such path.
+  virtual std::vector<Station> scan_path(double ball_radius, double interference, double z,
+                                         double step) const = 0;
   virtual const PieceParams& params() const = 0;
 };
 
 /// Builds a piece. Throws std::invalid_argument with the key that is wrong.
 std::unique_ptr<Piece> make_piece(const PieceParams& params);
-
-/// The ruled mid-surface alone.
-class RuledSurface {
- public:
-  RuledSurface(BSplineCurve bottom, BSplineCurve top);
-  struct Point {
-    Vec3 s, s_u, s_v, s_uu, s_uv;  ///< s_vv = 0
-  };
-  Point eval(double u, double v) const;
-  Vec3 normal(double u, double v) const;  ///< unit(S_u x S_v)
-  Vec3 ruling(double u) const;            ///< unit(C1 - C0)
-  double u_min() const { return bottom_.u_min(); }
-  double u_max() const { return bottom_.u_max(); }
-
- private:
-  BSplineCurve bottom_, top_;
-};
 
 }  // namespace vcnc

@@ -1,0 +1,99 @@
+// The live evaluation of a run: rows in, running figures at any time, a Summary at the end.
+//
+// Used by the live session, by the evaluation of a recording and by the report, so that all of them
+// give the same numbers bit for bit.
+//
+// Verdict. FAIL: |e_n| exceeds the tolerance on consecutive samples, at least kFailSamples of them
+// over at least kFailArc of the path (known at once: the measurement may end early). PASS: the
+// whole path is covered and |e_n| never exceeds the tolerance. Else INCOMPLETE.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "analysis/coverage.hpp"
+#include "analysis/dynamic_error.hpp"
+#include "analysis/lap_tracker.hpp"
+#include "analysis/summary.hpp"
+
+namespace vcnc {
+
+inline constexpr int kFailSamples = 3;
+inline constexpr double kFailArc = 0.3e-3;  ///< [m]
+
+/// One row with its place on the scan path.
+struct EvaluatedRow {
+  ErrorSample error;
+  LapTracker::Place place;
+  /// On the path, and the probe's value can be believed: counts in the statistics.
+  bool counts() const { return place.on_path && error.contact == Contact::ok; }
+};
+
+class Evaluation {
+ public:
+  /// Parses machine and piece of the run. Throws ConfigError or std::invalid_argument.
+  explicit Evaluation(const RunBegin& begin);
+
+  EvaluatedRow row(const TelemetryRow& row);
+  void alarm(const Alarm& alarm);
+  Summary finish(const RunEnd& end) const;
+
+  bool failed() const { return failed_; }
+  const Statistics& e_n() const { return whole_.e_n; }
+  const Coverage& coverage() const { return coverage_; }
+  const ScanLine* line() const { return tracker_ ? tracker_->line() : nullptr; }
+  const Machine& machine() const { return machine_; }
+  const Piece* piece() const { return piece_.get(); }
+
+ private:
+  void on_path(const EvaluatedRow& row);
+  void start_line();
+  void watch_tolerance(const EvaluatedRow& row, double step);
+  void collect_circle(const EvaluatedRow& row);
+  double median_interference() const;
+  void judge(Summary& summary) const;
+  void warn(Summary& summary) const;
+
+  RunBegin begin_;
+  Machine machine_;
+  std::unique_ptr<Piece> piece_;
+  DynamicError dynamic_error_;
+  std::optional<LapTracker> tracker_;
+  Coverage coverage_;
+
+  std::int64_t rows_ = 0;
+  Tick last_tick_ = 0;
+  std::uint64_t missing_ = 0, disordered_ = 0;
+  std::int64_t on_path_rows_ = 0, off_line_rows_ = 0;
+  Contact last_contact_ = Contact::ok;
+  bool last_on_path_ = false;
+
+  ErrorGroup whole_;
+  std::array<ErrorGroup, 5> faces_;
+  std::vector<ErrorGroup> crossings_;
+  PerAxis<Statistics> following_, following_on_path_, share_;
+  Statistics lag_, cross_;
+
+  static constexpr std::size_t kInterferenceBins = 4096;  ///< of 1 um, for the median
+  std::vector<std::uint32_t> interference_;
+
+  bool failed_ = false;
+  double fail_at_ = 0, fail_error_ = 0;
+  int over_samples_ = 0;
+  double over_arc_ = 0;
+
+  struct AngleBin {
+    double sum = 0;
+    std::uint32_t count = 0;
+  };
+  static constexpr std::size_t kAngleBins = 7200;  ///< of 0.05 deg
+  std::array<std::vector<AngleBin>, 2> circle_;    ///< counter-clockwise, clockwise
+  Vec3 circle_x_ = Vec3::UnitX(), circle_y_ = Vec3::UnitY();
+  double last_phi_ = 0;
+
+  std::vector<Alarm> alarms_;
+};
+
+}  // namespace vcnc

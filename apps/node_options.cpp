@@ -1,0 +1,54 @@
+#include "apps/node_options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cstring>
+#include <iostream>
+
+#include "model/input_error.hpp"
+
+namespace vcnc {
+
+NodeOptions parse_node_options(int argc, char** argv, const char* description, const char* needs) {
+  NodeOptions o;
+  CLI::App app{description};
+  const auto with = [&](char letter) { return std::strchr(needs, letter) != nullptr; };
+  if (with('m')) app.add_option("--machine", o.machine, "machine file")->required();
+  if (with('p')) {
+    app.add_option("--program", o.program, "G-code program")->required();
+    app.add_option("--pace", o.pace, "times real time, 0 = free-running")->check(CLI::NonNegativeNumber);
+  }
+  if (with('b')) app.add_option("--bus", o.bus, "hub:///PATH or can://INTERFACE")->required();
+  if (with('t')) app.add_option("--truth", o.truth, "path of the ground-truth channel")->required();
+  if (with('a'))
+    app.add_option("--axis", o.axis, "which drive")
+        ->required()
+        ->check(CLI::IsMember({"X", "Y", "Z", "A", "C", "spindle"}));
+  if (with('o')) {
+    app.add_option("--out", o.out, "result directory")->required();
+    app.add_flag("--csv", o.csv, "also write rows.csv");
+    app.add_flag("--no-report", o.no_report, "no report.html");
+  }
+  if (with('s')) app.add_option("--seed", o.seed, "seed of all noise");
+  app.add_option("--control-fd", o.control_fd, "pipe to the launcher");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    const int code = app.exit(e);
+    std::exit(code == 0 ? kExitOk : kExitBadInput);
+  }
+  return o;
+}
+
+int guarded_main(const char* name, int (*body)(int, char**), int argc, char** argv) {
+  try {
+    return body(argc, argv);
+  } catch (const InputError& e) {
+    std::cerr << name << ": " << e.what() << '\n';
+    return kExitBadInput;
+  } catch (const std::exception& e) {
+    std::cerr << name << ": " << e.what() << '\n';
+    return kExitFailure;
+  }
+}
+
+}  // namespace vcnc

@@ -1,0 +1,17 @@
+// vcnc-overtravel: the overtravel protection. It sees only the bus.
+#include "apps/serve.hpp"
+#include "configs/config.hpp"
+#include "probe_sim/overtravel_node.hpp"
+
+namespace {
+
+int overtravel(int argc, char** argv) {
+  using namespace vcnc;
+  const NodeOptions options = parse_node_options(argc, argv, "The overtravel protection on the bus", "mb");
+  OvertravelNode node(load_machine(options.machine));
+  return serve(node, options);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) { return vcnc::guarded_main("vcnc-overtravel", overtravel, argc, argv); }

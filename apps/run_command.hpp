@@ -1,0 +1,26 @@
+// `vcnc run`: the whole machine plays a program, the analysis watches, the results land in a folder.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace vcnc {
+
+struct RunOptions {
+  std::string program;
+  std::string machine;
+  std::vector<std::string> assignments;  ///< --set key=value
+  std::string bus = "hub://";            ///< hub:// picks a path of its own
+  double pace = 0;                       ///< times real time, 0 = free-running
+  std::uint64_t seed = 1;
+  std::string out;
+  bool in_process = false;
+  bool csv = false;
+  bool report = true;
+};
+
+/// Exit code of the program (apps/node_options.hpp). Throws InputError before anything is written.
+int run_command(const RunOptions& options);
+
+}  // namespace vcnc

@@ -1,0 +1,29 @@
+#include "apps/stop_signal.hpp"
+
+#include <unistd.h>
+
+#include <csignal>
+
+namespace vcnc {
+
+namespace {
+
+std::atomic<bool> requested{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+extern "C" void on_signal(int number) {
+  if (requested.exchange(true)) ::_exit(128 + number);
+}
+
+}  // namespace
+
+void catch_stop_signals() {
+  struct sigaction action {};
+  action.sa_handler = on_signal;
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+}
+
+const std::atomic<bool>& stop_requested() { return requested; }
+
+}  // namespace vcnc

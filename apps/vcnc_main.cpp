@@ -1,0 +1,104 @@
+// vcnc: the command that people type.
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+
+#include "analysis/session.hpp"
+#include "apps/node_options.hpp"
+#include "apps/program_command.hpp"
+#include "apps/run_command.hpp"
+#include "bus/wire_docs.hpp"
+#include "configs/config.hpp"
+
+namespace vcnc {
+namespace {
+
+/// "free" or a factor of real time.
+double parse_pace(const std::string& text) {
+  if (text == "free") return 0;
+  std::size_t used = 0;
+  double pace = 0;
+  try {
+    pace = std::stod(text, &used);
+  } catch (const std::exception&) {
+    used = 0;
+  }
+  if (used != text.size() || !(pace >= 0.01 && pace <= 1000))
+    throw InputError("--pace " + text + ": expected free or a factor of real time, 0.01 .. 1000");
+  return pace;
+}
+
+void add_run(CLI::App& app, int& code) {
+  struct Arguments : RunOptions {
+    std::string pace_text = "free";
+    bool no_report = false;
+  };
+  const auto o = std::make_shared<Arguments>();
+  CLI::App* run = app.add_subcommand("run", "run a program on the virtual machine and measure its dynamic error");
+  run->add_option("PROGRAM", o->program, "G-code program")->required();
+  run->add_option("--machine", o->machine, "machine file (TOML)")->required();
+  run->add_option("--set", o->assignments, "override a key of the machine file, e.g. axes.Y.kv_per_s=38")
+      ->allow_extra_args(false);
+  run->add_option("--bus", o->bus, "hub:// (default), can://INTERFACE or inproc://");
+  run->add_option("--pace", o->pace_text, "free (default) or a factor of real time");
+  run->add_option("--seed", o->seed, "seed of all noise");
+  run->add_option("--out", o->out, "folder for the results")->required();
+  run->add_flag("--in-process", o->in_process, "all modules in this process");
+  run->add_flag("--csv", o->csv, "also write every row as rows.csv");
+  run->add_flag("--no-report", o->no_report, "no report.html");
+  run->callback([o, &code] {
+    o->pace = parse_pace(o->pace_text);
+    o->report = !o->no_report;
+    code = run_command(*o);
+  });
+}
+
+void add_analyze(CLI::App& app) {
+  struct Arguments {
+    std::string path, out;
+    bool csv = false;
+  };
+  const auto o = std::make_shared<Arguments>();
+  CLI::App* analyze_command = app.add_subcommand("analyze", "evaluate a recording again");
+  analyze_command->add_option("RUN", o->path, "recording or folder of a run")->required();
+  analyze_command->add_option("--out", o->out, "also write summary.json and report.html into this folder");
+  analyze_command->add_flag("--csv", o->csv, "with --out: also write every row as rows.csv");
+  analyze_command->callback([o] {
+    const RecordingReader recording(o->path);
+    for (const std::string& missing : recording.missing())
+      std::cerr << "vcnc: " << o->path << ": missing: " << missing << '\n';
+    const Summary summary = analyze(recording);
+    std::cout << to_text(summary);
+    if (!o->out.empty()) write_results(recording, summary, {.folder = o->out, .report = true, .csv = o->csv});
+  });
+}
+
+void add_references(CLI::App& app) {
+  app.add_subcommand("keys", "all keys of machine and piece files, as Markdown")->callback([] {
+    std::cout << "# Keys of a machine file\n\n" << machine_key_reference() << "\n# Keys of a piece file\n\n" << piece_key_reference();
+  });
+  app.add_subcommand("wire", "all messages on the bus, as Markdown")->callback([] { std::cout << wire_table_markdown(); });
+  app.add_subcommand("dbc", "all messages on the bus, as a DBC file for CAN tools")->callback([] { std::cout << dbc(); });
+}
+
+int command_line(int argc, char** argv) {
+  CLI::App app{"vcnc: a virtual five-axis CNC machine that behaves like a measured one"};
+  app.set_version_flag("--version", VCNC_VERSION);
+  app.require_subcommand(1);
+  int code = kExitOk;
+  add_run(app, code);
+  add_analyze(app);
+  add_program_command(app);
+  add_references(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kExitOk : kExitBadInput;
+  }
+  return code;
+}
+
+}  // namespace
+}  // namespace vcnc
+
+int main(int argc, char** argv) { return vcnc::guarded_main("vcnc", vcnc::command_line, argc, argv); }

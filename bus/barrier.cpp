@@ -1,0 +1,106 @@
+#include "bus/barrier.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace vcnc {
+
+namespace {
+
+constexpr int kSliceMs = 100;  // how soon a stop from outside is noticed
+
+bool is_set(const std::atomic<bool>* flag) {
+  return flag != nullptr && flag->load(std::memory_order_relaxed);
+}
+
+}  // namespace
+
+Barrier::Barrier(Transport& bus, const Roster& roster, const std::atomic<bool>* stop)
+    : bus_(bus), roster_(roster), stop_(stop) {
+  if (roster.empty()) throw std::invalid_argument("the roster of the bus is empty");
+  for (const RosterEntry& entry : roster) {
+    if (entry.id < 1 || entry.id > 127)
+      throw std::invalid_argument(
+          fmt::format("node id {} of {}: allowed is 1..127", entry.id, entry.name));
+    const auto id = static_cast<std::size_t>(entry.id);
+    if (expected_[id])
+      throw std::invalid_argument(fmt::format("node id {} of {} is used twice", id, entry.name));
+    expected_.set(id);
+  }
+}
+
+const std::string& Barrier::name(int id) const {
+  return std::find_if(roster_.begin(), roster_.end(),
+                      [id](const RosterEntry& e) { return e.id == id; })
+      ->name;
+}
+
+std::string Barrier::missing() const {
+  std::string names;
+  for (const RosterEntry& entry : roster_)
+    if (!arrived_[static_cast<std::size_t>(entry.id)])
+      names += (names.empty() ? "" : ", ") + entry.name;
+  return names;
+}
+
+void Barrier::note(Tick k, const Frame& frame) {
+  if (frame.id > kStatusBase && frame.id < kStatusBase + 128) {
+    const auto id = static_cast<std::size_t>(frame.id - kStatusBase);
+    if (!expected_[id]) return;
+    if (arrived_[id])
+      throw BarrierError(
+          fmt::format("{} answered twice in cycle {}", name(static_cast<int>(id)), k));
+    arrived_.set(id);
+  } else if (const auto heartbeat = decode_heartbeat(frame)) {
+    if (!expected_[static_cast<std::size_t>(heartbeat->node)]) return;
+    if (heartbeat->state == NmtState::boot_up)
+      throw BarrierError(fmt::format("{} restarted in cycle {}", name(heartbeat->node), k));
+    if (heartbeat->state == NmtState::stopped)
+      throw BarrierError(fmt::format("{} left the bus in cycle {}", name(heartbeat->node), k));
+  }
+}
+
+bool Barrier::collect(Tick k, Frames& answers, int timeout_ms) {
+  forget();
+  int waited_ms = 0;  // since the last frame that arrived
+  while (!complete()) {
+    if (is_set(stop_)) return false;
+    const std::size_t known = answers.size();
+    const int slice_ms = std::min(kSliceMs, timeout_ms - waited_ms);
+    switch (bus_.receive(answers, slice_ms)) {
+      case Transport::Received::closed:
+        throw BarrierError(fmt::format("the bus was closed in cycle {}", k));
+      case Transport::Received::timeout:
+        waited_ms += slice_ms;
+        if (waited_ms >= timeout_ms)
+          throw BarrierError(
+              fmt::format("no answer within {} ms in cycle {} from: {}", timeout_ms, k, missing()));
+        break;
+      case Transport::Received::frames:
+        for (std::size_t i = known; i < answers.size(); ++i) note(k, answers[i]);
+        break;
+    }
+  }
+  return true;
+}
+
+bool Barrier::all_in_state(NmtState state, int timeout_ms) {
+  scratch_.clear();
+  switch (bus_.receive(scratch_, timeout_ms)) {
+    case Transport::Received::closed: throw BarrierError("the bus was closed during start-up");
+    case Transport::Received::timeout: break;
+    case Transport::Received::frames:
+      for (const Frame& frame : scratch_) {
+        const auto heartbeat = decode_heartbeat(frame);
+        if (!heartbeat || !expected_[static_cast<std::size_t>(heartbeat->node)]) continue;
+        if (heartbeat->state == NmtState::stopped)
+          throw BarrierError(fmt::format("{} left the bus during start-up", name(heartbeat->node)));
+        if (heartbeat->state == state) arrived_.set(static_cast<std::size_t>(heartbeat->node));
+      }
+      break;
+  }
+  return complete();
+}
+
+}  // namespace vcnc

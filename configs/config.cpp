@@ -1,0 +1,290 @@
+#include "configs/config.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <initializer_list>
+#include <set>
+#include <sstream>
+#include <utility>
+
+namespace vcnc {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string where(const toml::node& node) {
+  const toml::source_region& source = node.source();
+  const std::string name = source.path ? *source.path : std::string("?");
+  if (name.starts_with("--")) return name;
+  return fmt::format("{}:{}", name, source.begin.line);
+}
+
+[[noreturn]] void fail(const toml::node& node, const std::string& key, const std::string& reason) {
+  throw ConfigError(fmt::format("{}: {}: {}", where(node), key, reason));
+}
+
+/// Edit distance, for "did you mean".
+std::size_t distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t above = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      diagonal = above;
+    }
+  }
+  return row.back();
+}
+
+/// Reads a TOML table into a struct by visiting its fields.
+class Reader {
+ public:
+  Reader(const toml::table& table, std::string path) : table_(table), path_(std::move(path)) {}
+
+  void operator()(std::string_view key, double& v, Unit u, Range r, const char*) {
+    if (const toml::node* n = find(key)) v = number(*n, full(key), u, r);
+  }
+  void operator()(std::string_view key, Vec3& v, Unit u, Range r, const char*) {
+    if (const toml::node* n = find(key)) v = vec(*n, full(key), u, r);
+  }
+  void operator()(std::string_view key, std::vector<double>& v, Unit u, Range r, const char*) {
+    const toml::node* n = find(key);
+    if (!n) return;
+    v.clear();
+    for (const toml::node& element : array(*n, full(key), "an array of numbers"))
+      v.push_back(number(element, full(key), u, r));
+  }
+  void operator()(std::string_view key, std::vector<Vec3>& v, Unit u, Range r, const char*) {
+    const toml::node* n = find(key);
+    if (!n) return;
+    v.clear();
+    for (const toml::node& element : array(*n, full(key), "an array of [x, y, z]"))
+      v.push_back(vec(element, full(key), u, r));
+  }
+  void operator()(std::string_view key, int& v, Range r, const char*) {
+    const toml::node* n = find(key);
+    if (!n) return;
+    const auto value = n->value_exact<std::int64_t>();
+    if (!value) fail(*n, full(key), "expected a whole number");
+    check_range(*n, full(key), static_cast<double>(*value), unit::none, r);
+    v = static_cast<int>(*value);
+  }
+  void operator()(std::string_view key, bool& v, const char*) {
+    const toml::node* n = find(key);
+    if (!n) return;
+    const auto value = n->value_exact<bool>();
+    if (!value) fail(*n, full(key), "expected true or false");
+    v = *value;
+  }
+  void operator()(std::string_view key, std::string& v, const char*) {
+    const toml::node* n = find(key);
+    if (!n) return;
+    const auto value = n->value_exact<std::string>();
+    if (!value) fail(*n, full(key), "expected a text in quotes");
+    v = *value;
+  }
+  template <class Enum>
+  void choice(std::string_view key, Enum& v,
+              std::initializer_list<std::pair<const char*, Enum>> names, const char*) {
+    const toml::node* n = find(key);
+    if (!n) return;
+    const auto text = n->value_exact<std::string>();
+    std::string allowed;
+    for (const auto& [name, value] : names) {
+      if (text && *text == name) {
+        v = value;
+        return;
+      }
+      allowed += fmt::format("{}\"{}\"", allowed.empty() ? "" : ", ", name);
+    }
+    fail(*n, full(key), fmt::format("expected one of {}", allowed));
+  }
+  template <class T, class... Args>
+  void group(std::string_view key, T& v, const char* doc, Args... args) {
+    section(key, doc, [&](Reader& inner) { T::fields(v, inner, args...); });
+  }
+  template <class F>
+  void section(std::string_view key, const char*, F&& f) {
+    static const toml::table kEmpty;
+    const toml::node* n = find(key);
+    if (n && !n->is_table()) fail(*n, full(key), "expected a table");
+    Reader inner(n ? *n->as_table() : kEmpty, full(key));
+    f(inner);
+    inner.refuse_unknown_keys();
+  }
+
+  void refuse_unknown_keys() const {
+    for (const auto& [key, node] : table_) {
+      if (known_.contains(std::string(key.str()))) continue;
+      fail(node, full(key.str()), "unknown key" + suggestion(key.str()));
+    }
+  }
+
+ private:
+  const toml::node* find(std::string_view key) {
+    known_.insert(std::string(key));
+    return table_.get(key);
+  }
+  std::string full(std::string_view key) const {
+    return path_.empty() ? std::string(key) : path_ + "." + std::string(key);
+  }
+
+  /// A key with the same stem and another unit, else the nearest spelling, else all keys.
+  std::string suggestion(std::string_view wrong) const {
+    const auto stem = [](std::string_view k) { return k.substr(0, k.find('_')); };
+    const std::string* best = nullptr;
+    std::size_t best_cost = ~std::size_t{0};
+    for (const std::string& k : known_) {
+      const std::size_t edits = distance(wrong, k);
+      const bool same_stem = stem(k) == stem(wrong);
+      if (!same_stem && edits > wrong.size() / 3) continue;
+      const std::size_t cost = 2 * edits + (same_stem ? 0 : 1);
+      if (cost < best_cost) best_cost = cost, best = &k;
+    }
+    if (best) return fmt::format("; did you mean {}?", *best);
+    std::string all;
+    for (const std::string& k : known_) all += (all.empty() ? "" : ", ") + k;
+    return "; allowed here: " + all;
+  }
+
+  static void check_range(const toml::node& n, const std::string& key, double v, Unit u, Range r) {
+    if (!(v >= r.min && v <= r.max))
+      fail(n, key,
+           fmt::format("{} is out of range, allowed {} .. {}{}{}", v, r.min, r.max,
+                       u.suffix.empty() ? "" : " ", u.suffix));
+  }
+  static double number(const toml::node& n, const std::string& key, Unit u, Range r) {
+    const auto value = n.value<double>();
+    if (!value || !n.is_number())
+      fail(n, key, fmt::format("expected a number{}{}", u.suffix.empty() ? "" : " in ", u.suffix));
+    if (!std::isfinite(*value)) fail(n, key, "expected a finite number");
+    check_range(n, key, *value, u, r);
+    return *value * u.to_si;
+  }
+  static const toml::array& array(const toml::node& n, const std::string& key, const char* what) {
+    if (!n.is_array()) fail(n, key, fmt::format("expected {}", what));
+    return *n.as_array();
+  }
+  static Vec3 vec(const toml::node& n, const std::string& key, Unit u, Range r) {
+    const toml::array& a = array(n, key, "an array [x, y, z]");
+    if (a.size() != 3) fail(n, key, fmt::format("expected 3 numbers, found {}", a.size()));
+    return {number(a[0], key, u, r), number(a[1], key, u, r), number(a[2], key, u, r)};
+  }
+
+  const toml::table& table_;
+  std::string path_;
+  std::set<std::string> known_;
+};
+
+toml::table parse(std::string_view text, const std::string& name) {
+  try {
+    return toml::parse(text, name);
+  } catch (const toml::parse_error& e) {
+    throw ConfigError(fmt::format("{}:{}: {}", name, e.source().begin.line, e.description()));
+  }
+}
+
+std::string read_file(const std::string& path) {
+  if (fs::is_directory(path)) throw ConfigError(path + ": is a directory, expected a TOML file");
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw ConfigError(path + ": cannot be opened");
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+template <class T>
+T read(const toml::table& table) {
+  T result;
+  Reader reader(table, "");
+  T::fields(result, reader);
+  reader.refuse_unknown_keys();
+  return result;
+}
+
+/// Moves `from` into `into` (a copy would forget where a value came from); later values win.
+void merge(toml::table& into, toml::table&& from) {
+  for (auto&& [key, node] : from) {
+    toml::table* both = into[key].as_table();
+    if (both && node.is_table())
+      merge(*both, std::move(*node.as_table()));
+    else
+      into.insert_or_assign(key, std::move(node));
+  }
+}
+
+toml::table parse_assignment(const std::string& assignment) {
+  const std::string name = "--set " + assignment;
+  const std::size_t equals = assignment.find('=');
+  if (equals == std::string::npos || equals == 0)
+    throw ConfigError(name + ": expected key=value, for example axes.Y.kv_per_s=38");
+  try {
+    return toml::parse(assignment, name);
+  } catch (const toml::parse_error&) {  // a bare word is a text
+    return parse(
+        fmt::format("{} = '''{}'''", assignment.substr(0, equals), assignment.substr(equals + 1)),
+        name);
+  }
+}
+
+/// What single ranges cannot say.
+void check_whole(const Machine& m, const std::string& name) {
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const AxisLimits& l = m.axes[i].limits;
+    if (!(l.min < l.max))
+      throw ConfigError(fmt::format(
+          "{}: axes.{}: the lower travel limit must be below the upper one", name, kAxisNames[i]));
+    if (l.start < l.min || l.start > l.max)
+      throw ConfigError(fmt::format("{}: axes.{}: the start position is outside the travel limits",
+                                    name, kAxisNames[i]));
+  }
+  if (m.probe.adc_bits != 12 && m.probe.adc_bits != 16)
+    throw ConfigError(fmt::format("{}: probe.adc_bits: {} is not possible, allowed 12 or 16", name,
+                                  m.probe.adc_bits));
+  if (m.setup.predeflection >= m.probe.range)
+    throw ConfigError(
+        fmt::format("{}: setup.predeflection_mm: {:g} must be below probe.range_mm, {:g}", name,
+                    m.setup.predeflection / unit::mm.to_si, m.probe.range / unit::mm.to_si));
+}
+
+}  // namespace
+
+Machine load_machine(const std::string& path, const std::vector<std::string>& assignments) {
+  toml::table table = parse(read_file(path), path);
+  const toml::node* file_piece = table["setup"]["piece"].node();
+  fs::path base = file_piece ? fs::absolute(path).parent_path() : fs::current_path();
+  for (const std::string& assignment : assignments) {
+    toml::table one = parse_assignment(assignment);
+    if (one["setup"]["piece"].node()) base = fs::current_path();
+    merge(table, std::move(one));
+  }
+  Machine machine = read<Machine>(table);
+  check_whole(machine, path);
+  if (!machine.setup.piece.empty())
+    machine.setup.piece = fs::weakly_canonical(base / machine.setup.piece).string();
+  return machine;
+}
+
+Machine parse_machine(std::string_view toml, const std::string& name) {
+  const toml::table table = parse(toml, name);
+  Machine machine = read<Machine>(table);
+  check_whole(machine, name);
+  return machine;
+}
+
+PieceParams load_piece(const std::string& path) { return parse_piece(read_file(path), path); }
+
+PieceParams parse_piece(std::string_view toml, const std::string& name) {
+  return read<PieceParams>(parse(toml, name));
+}
+
+}  // namespace vcnc

@@ -1,0 +1,157 @@
+// G-code to typed blocks: the words of a line change the modal state, and what remains to be done
+// is a Move, a Dwell, a spindle word, a stop or the end.
+//
+// Accepted
+//   motion    G0 G1 G2 G3 (centre by I J K, incremental, or R; helical)    plane  G17 G18 G19
+//   G4 P[s]   G28 (via point, then the reference = start positions of the machine file)
+//   units     G20 G21      distance  G90 G91      feed  G93 G94
+//   length    G43 Hn   G43.4 Hn (RTCP)   G49      cutter compensation  G40 (off)
+//   offsets   G53 (one block, machine coordinates)   G54 .. G59
+//   path      G61 (exact)  G64 [Pn, tolerance in length units]
+//   M0 M1 M2 M3 M4 M5 M19 M30, F, S, N, O and % headers
+// Everything else is refused with FILE:LINE, the word, and what is allowed.
+//
+// Coordinates. Without RTCP, X Y Z are axis positions in the active work offset: axis = word +
+// offset (+ tool length on Z under G43). Under G43.4 they are the controlled point in the workpiece
+// frame of the active offset. A and C are always positions of the rotary axes [deg].
+// G91 is incremental in the same coordinates.
+//
+// At the start: G17 G21 G40 G49 G54 G64 G90 G94, no motion mode, no feed. M0 holds for
+// kProgramStopSeconds (the operator of a virtual machine presses start at once); the switch for the
+// optional stop M1 is off, so M1 only brings the axes to rest. What follows M2 or M30 is not read; a
+// file without either is refused.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "controller/gcode_words.hpp"
+#include "model/geometry/kinematics.hpp"
+#include "model/machine.hpp"
+
+namespace vcnc {
+
+inline constexpr double kProgramStopSeconds = 1.0;
+
+/// Coordinates a program speaks: (X, Y, Z, A, C), either the controlled point with the rotary axes
+/// (RTCP) or five axis positions [m, rad].
+using Coordinates = Eigen::Matrix<double, 5, 1>;
+
+/// What the coordinates of a move mean.
+struct MotionFrame {
+  bool rtcp = false;           ///< false: axis positions; the rest has no meaning then
+  Vec3 p_MW = Vec3::Zero();    ///< work offset [m]
+  double tool_length = 0;      ///< [m]
+  friend bool operator==(const MotionFrame&, const MotionFrame&) = default;
+};
+
+/// Converts between the coordinates of a frame and axis positions.
+class FrameMap {
+ public:
+  FrameMap(const KinematicsParams& params, const MotionFrame& frame);
+  Coordinates to_axes(const Coordinates& x) const;
+  Coordinates from_axes(const Coordinates& q) const;
+
+ private:
+  std::optional<Kinematics> kinematics_;
+};
+
+/// Circle (or spiral, within the radius tolerance) about an axis parallel to X, Y or Z.
+struct Arc {
+  Vec3 centre = Vec3::Zero();  ///< its component along the normal has no meaning
+  std::size_t normal = kZ;     ///< index of the plane's normal
+  double sweep = 0;            ///< [rad], positive counter-clockwise seen from +normal
+};
+
+struct Move {
+  enum class Kind { rapid, line, arc };
+  enum class Feed { none, tip, rotary, time };  ///< none: rapid; rotary: only A, C move
+  Kind kind = Kind::line;
+  Coordinates start = Coordinates::Zero(), end = Coordinates::Zero();
+  MotionFrame frame;
+  Arc arc;
+  Feed feed_mode = Feed::none;
+  double feed = 0;         ///< tip [m/s], rotary [rad/s], time [s] for the whole move
+  bool exact = false;      ///< G61
+  double tolerance = 0;    ///< G64: of the controlled point [m]
+  bool alone = false;      ///< begins and ends at rest (G28, G53)
+  int line = 0;
+};
+
+struct Dwell {
+  double seconds = 0;
+  int line = 0;
+};
+
+struct SpindleWord {
+  enum class Mode { off, clockwise, counter_clockwise, orient };
+  Mode mode = Mode::off;
+  double speed = 0;  ///< [rad/s]
+  int line = 0;
+};
+
+/// M0 (waits) and M1 (the switch is off: only brings the axes to rest).
+struct ProgramStop {
+  bool optional = false;
+  int line = 0;
+};
+
+struct ProgramEnd {
+  int line = 0;
+};
+
+using Block = std::variant<Move, Dwell, SpindleWord, ProgramStop, ProgramEnd>;
+
+/// Reads a program block by block with bounded memory.
+class GcodeInterpreter {
+ public:
+  /// Throws ProgramError where the file cannot be read.
+  GcodeInterpreter(const std::string& path, const Machine& machine);
+
+  /// The next block; ProgramEnd is the last one and is repeated. Throws ProgramError.
+  Block next();
+
+ private:
+  struct Modal {
+    std::optional<int> motion;  ///< 0, 1, 2, 3
+    std::size_t normal = kZ;
+    double length_unit = 1e-3;
+    bool absolute = true, inverse_time = false, exact = false;
+    double tolerance = 0;
+    std::size_t offset = 0;  ///< index of G54..G59
+    enum class Length { none, along_z, rtcp } length = Length::none;
+    double tool_length = 0;
+    double linear_feed = 0, rotary_feed = 0;  ///< [m/s], [rad/s]; 0: no F yet
+    double spindle_speed = 0;                 ///< [rad/s]
+  };
+  struct Line;  ///< the words of one line, sorted
+
+  void read_line(const std::string& text);
+  Line sort_words(const std::vector<Word>& words) const;
+  void set_modes(const Line& line);
+  void set_tool_length(const Line& line, int code);
+  void set_feed(const Line& line);
+  void set_spindle(const Line& line);
+  void emit_motion(const Line& line);
+  void emit_reference_return(const Line& line);
+  Coordinates target(const Line& line, bool machine_coordinates) const;
+  Arc arc_to(const Line& line, const Coordinates& end) const;
+  void emit_move(Move move);
+  void enter_frame();  ///< re-expresses the position after a change of offset or length
+  MotionFrame frame() const;
+  [[noreturn]] void fail(const std::string& reason) const;
+
+  const Machine machine_;
+  ProgramLines lines_;
+  Modal modal_;
+  MotionFrame frame_;
+  FrameMap map_;
+  Coordinates position_;  ///< in frame_
+  std::deque<Block> ready_;
+  bool ended_ = false;
+};
+
+}  // namespace vcnc

@@ -1,0 +1,118 @@
+#include "controller/planner_law.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+namespace vcnc {
+namespace {
+
+/// Each limit v spread over +- v T/2: the least of all that reach a node.
+std::vector<double> spread_limits(const std::vector<LimitNode>& nodes, double window) {
+  const std::size_t n = nodes.size();
+  std::vector<std::size_t> order(n);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return nodes[a].v_max < nodes[b].v_max;
+  });
+  // From the slowest on, paint what is not painted yet; next_free skips what is.
+  std::vector<double> v(n, 0);
+  std::vector<std::size_t> next_free(n + 1);
+  std::iota(next_free.begin(), next_free.end(), std::size_t{0});
+  const auto find_free = [&](std::size_t i) {
+    std::size_t root = i;
+    while (next_free[root] != root) root = next_free[root];
+    while (next_free[i] != root) i = std::exchange(next_free[i], root);
+    return root;
+  };
+  for (const std::size_t j : order) {
+    const double limit = nodes[j].v_max, reach = 0.5 * limit * window;
+    const auto first = std::lower_bound(
+        nodes.begin(), nodes.end(), nodes[j].s - reach,
+        [](const LimitNode& node, double s) { return node.s < s; });
+    for (std::size_t i = find_free(static_cast<std::size_t>(first - nodes.begin()));
+         i < n && nodes[i].s <= nodes[j].s + reach; i = find_free(i)) {
+      v[i] = limit;
+      next_free[i] = i + 1;
+    }
+  }
+  return v;
+}
+
+/// Largest v at one node that is reached from the speed `from` at the other.
+double reachable(const LimitNode& a, const LimitNode& b, double from, double window,
+                 const MotionLimits& limits) {
+  const double acceleration = std::min(a.acceleration(from, window, limits),
+                                       b.acceleration(from, window, limits));
+  return std::sqrt(from * from + 2 * acceleration * std::abs(b.s - a.s));
+}
+
+}  // namespace
+
+SpeedLaw::SpeedLaw(const std::vector<LimitNode>& nodes, const MotionLimits& limits, double window)
+    : window_(window) {
+  std::vector<double> v = spread_limits(nodes, window);
+  const std::size_t n = nodes.size();
+  v.front() = v.back() = 0;
+  for (std::size_t j = 1; j < n; ++j)
+    v[j] = std::min(v[j], reachable(nodes[j - 1], nodes[j], v[j - 1], window, limits));
+  for (std::size_t j = n - 1; j-- > 0;)
+    v[j] = std::min(v[j], reachable(nodes[j + 1], nodes[j], v[j + 1], window, limits));
+  knots_.reserve(n);
+  double t = 0;
+  for (std::size_t j = 0; j < n; ++j) {
+    if (j > 0) t += 2 * (nodes[j].s - nodes[j - 1].s) / (v[j] + v[j - 1]);
+    knots_.push_back({t, nodes[j].s, v[j]});
+  }
+}
+
+SpeedLaw SpeedLaw::fastest(const std::vector<LimitNode>& nodes, const MotionLimits& limits) {
+  constexpr double kShortest = 4e-3, kRatio = 0.7;
+  double window = 2 * (limits.acceleration.cwiseQuotient(limits.jerk)).maxCoeff();
+  SpeedLaw best(nodes, limits, std::max(window, kShortest));
+  while ((window *= kRatio) > kShortest) {
+    SpeedLaw law(nodes, limits, window);
+    if (law.duration() < best.duration()) best = std::move(law);
+  }
+  return best;
+}
+
+std::size_t SpeedLaw::index(double t) const {
+  const auto next = std::upper_bound(knots_.begin() + 1, knots_.end() - 1, t,
+                                     [](double a, const Knot& b) { return a < b.t; });
+  return static_cast<std::size_t>(next - knots_.begin()) - 1;
+}
+
+LawPoint SpeedLaw::raw_in(std::size_t cell, double t) const {
+  const Knot &from = knots_[cell], &to = knots_[cell + 1];
+  const double a = (to.v - from.v) / (to.t - from.t), dt = t - from.t;
+  return {from.s + dt * (from.v + 0.5 * a * dt), from.v + a * dt};
+}
+
+LawPoint SpeedLaw::raw(double t) const {
+  if (t <= 0) return {0, 0};
+  if (t >= knots_.back().t) return {knots_.back().s, 0};
+  return raw_in(index(t), t);
+}
+
+LawPoint SpeedLaw::at(double t) const {
+  t *= pace_;
+  const double from = t - window_, end = knots_.back().t, last = knots_.back().s;
+  if (t <= 0) return {0, 0};
+  if (from >= end) return {last, 0};
+  // Integral of s - reference over the window; Simpson's rule is exact in each cell.
+  const double reference = raw(t).s;
+  double sum = from < 0 ? from * reference : 0;  // before the start s = 0
+  if (t > end) sum += (t - end) * (last - reference);
+  const double lo = std::max(from, 0.0), hi = std::min(t, end);
+  for (std::size_t cell = index(lo); cell + 1 < knots_.size() && knots_[cell].t < hi; ++cell) {
+    const double a = std::max(lo, knots_[cell].t), b = std::min(hi, knots_[cell + 1].t);
+    sum += (b - a) / 6 *
+           (raw_in(cell, a).s + 4 * raw_in(cell, 0.5 * (a + b)).s + raw_in(cell, b).s -
+            6 * reference);
+  }
+  return {reference + sum / window_, pace_ * (reference - raw(from).s) / window_};
+}
+
+}  // namespace vcnc

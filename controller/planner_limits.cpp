@@ -1,0 +1,104 @@
+#include "controller/planner_limits.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vcnc {
+namespace {
+
+constexpr double kCurveShare = 0.7;
+constexpr double kLargestStep = 1e-3;  ///< [m]
+constexpr double kFewestSteps = 32;
+constexpr double kStepsPerWidth = 4;
+
+}  // namespace
+
+MotionLimits::MotionLimits(const Machine& machine, double share) {
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const AxisLimits& axis = machine.axes[i].limits;
+    const auto row = static_cast<Eigen::Index>(i);
+    velocity[row] = share * axis.velocity;
+    acceleration[row] = share * axis.acceleration;
+    jerk[row] = share * axis.jerk;
+  }
+}
+
+AxisPoint axis_point(const FrameMap& map, const PathPoint& point) {
+  // The inverse kinematics are smooth, so a central difference along the path's tangent is exact
+  // to some 1e-10 of the step-free derivative.
+  constexpr double kStep = 1e-5;
+  const double size = point.dx.norm();
+  if (size < 1e-12) return {map.to_axes(point.x), Coordinates::Zero()};
+  const double e = kStep / std::max(1.0, size);
+  return {map.to_axes(point.x),
+          (map.to_axes(point.x + e * point.dx) - map.to_axes(point.x - e * point.dx)) / (2 * e)};
+}
+
+double feed_limit(const Path& path, double s, const Coordinates& dx) {
+  constexpr double kNone = 1e9, kStill = 1e-9;
+  const PathSegment& segment = path.segment(s);
+  double pace = 1;
+  switch (segment.move.feed_mode) {
+    case Move::Feed::none: return kNone;
+    case Move::Feed::time: return segment.length / segment.move.feed;
+    case Move::Feed::tip: pace = dx.head<3>().norm(); break;
+    case Move::Feed::rotary: pace = dx.tail<2>().norm(); break;
+  }
+  return pace > kStill ? segment.move.feed / pace : kNone;
+}
+
+double LimitNode::acceleration(double v, double window, const MotionLimits& limits) const {
+  double a = 1e9;
+  for (Eigen::Index i = 0; i < 5; ++i) {
+    if (d1[i] > 1e-12) a = std::min(a, (limits.acceleration[i] - d2[i] * v * v) / d1[i]);
+    const double per_a = 3 * d2[i] * v + 2 * d1[i] / window;
+    if (per_a > 1e-12) a = std::min(a, (limits.jerk[i] - d3[i] * v * v * v) / per_a);
+  }
+  return a_scale * std::max(a, 0.0);
+}
+
+std::vector<LimitNode> limit_nodes(const Path& path, const FrameMap& map,
+                                   const MotionLimits& limits) {
+  const double length = path.length();
+  std::vector<LimitNode> nodes;
+  std::vector<Coordinates> slope;
+  for (double s = 0;;) {
+    const PathPoint point = path.eval(s);
+    slope.push_back(axis_point(map, point).dq);
+    LimitNode& node = nodes.emplace_back();
+    node.s = s;
+    node.v_max = feed_limit(path, s, point.dx);
+    if (s >= length) break;
+    const double step = std::min({path.half_width(s) / kStepsPerWidth, kLargestStep,
+                                  length / kFewestSteps});
+    s = length - s < 1.5 * step ? length : s + step;
+  }
+
+  // Second and third derivatives by differences of the exact first one; each node then takes the
+  // largest values of its neighbourhood.
+  const std::size_t n = nodes.size();
+  std::vector<Coordinates> second(n - 1), third(n, Coordinates::Zero());
+  for (std::size_t j = 0; j + 1 < n; ++j)
+    second[j] = (slope[j + 1] - slope[j]) / (nodes[j + 1].s - nodes[j].s);
+  for (std::size_t j = 1; j + 1 < n; ++j)
+    third[j] = (second[j] - second[j - 1]) * (2 / (nodes[j + 1].s - nodes[j - 1].s));
+  for (std::size_t j = 0; j < n; ++j) {
+    const std::size_t left = j > 0 ? j - 1 : 0, right = std::min(j + 1, n - 1);
+    LimitNode& node = nodes[j];
+    node.d1 = slope[left].cwiseAbs().cwiseMax(slope[j].cwiseAbs()).cwiseMax(slope[right].cwiseAbs());
+    node.d2 = second[std::min(left, n - 2)].cwiseAbs().cwiseMax(
+        second[std::min(j, n - 2)].cwiseAbs());
+    node.d3 = third[left].cwiseAbs().cwiseMax(third[j].cwiseAbs()).cwiseMax(third[right].cwiseAbs());
+    for (Eigen::Index i = 0; i < 5; ++i) {
+      if (node.d1[i] > 0) node.v_max = std::min(node.v_max, limits.velocity[i] / node.d1[i]);
+      if (node.d2[i] > 0)
+        node.v_max =
+            std::min(node.v_max, std::sqrt(kCurveShare * limits.acceleration[i] / node.d2[i]));
+      if (node.d3[i] > 0)
+        node.v_max = std::min(node.v_max, std::cbrt(kCurveShare * limits.jerk[i] / node.d3[i]));
+    }
+  }
+  return nodes;
+}
+
+}  // namespace vcnc

@@ -1,0 +1,93 @@
+#include "model/probe/contact.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vcnc {
+namespace {
+
+constexpr double kStep = 100e-6;       // [s]
+constexpr double kGravity = 9.80665;   // [m/s^2]
+
+}  // namespace
+
+double UsableRange::share(const Vec3& deflection) const {
+  double worst = 0;
+  for (int i = 0; i < 3; ++i)
+    worst = std::max(worst, deflection[i] / (deflection[i] < 0 ? -negative[i] : positive[i]));
+  return worst;
+}
+
+UsableRange usable_range(const ProbeParams& probe) {
+  UsableRange range{Vec3::Constant(probe.range), Vec3::Constant(probe.range)};
+  const bool vertical = probe.mounting == ProbeParams::Mounting::vertical;
+  const double mass = probe.stylus_mass + (vertical ? 0 : probe.moving_mass);
+  const double shift = std::min(mass * kGravity / probe.spring_rate, 0.99 * probe.range);
+  // Vertical: the stylus hangs towards -z. Horizontal: +y of the probe is down.
+  const int axis = vertical ? 2 : 1;
+  range.positive[axis] += vertical ? shift : -shift;
+  range.negative[axis] += vertical ? -shift : shift;
+  return range;
+}
+
+ProbeContact::ProbeContact(const ProbeParams& probe, const ProbeEffects& effects, const Piece* piece)
+    : probe_(probe),
+      effects_(effects),
+      piece_(piece),
+      mass_(probe.moving_mass + probe.stylus_mass),
+      damping_(2 * probe.damping_ratio * std::sqrt(probe.spring_rate * mass_)) {}
+
+void ProbeContact::place(const ToolPose& pose) {
+  p_ = p_tool_ = pose.p_WT;
+  placed_ = true;
+  if (piece_ == nullptr) return;
+  surface_ = piece_->nearest(p_, surface_);
+  if (surface_.valid && surface_.distance < probe_.ball_radius)
+    p_ += (probe_.ball_radius - surface_.distance) * surface_.n;
+}
+
+Vec3 ProbeContact::step(const ToolPose& pose) {
+  if (!placed_) place(pose);
+  const Vec3 v_tool = (pose.p_WT - p_tool_) / kStep;
+  const double inertia = mass_ + kStep * damping_;  // with the implicit damper
+  const Vec3 spring = probe_.spring_rate * (p_ - p_tool_);
+  Vec3 v = (mass_ * v_ - kStep * spring + kStep * damping_ * v_tool) / inertia;
+
+  if (effects_.return_to_zero > 0) {
+    // The guides rub on the housing: a friction impulse that can at most stop the sliding in them.
+    const Vec3 sliding = v - v_tool;
+    const double speed = sliding.norm();
+    const double most = kStep * probe_.spring_rate * effects_.return_to_zero / inertia;
+    if (speed > 0) v -= sliding * std::min(1.0, most / speed);
+  }
+
+  touching_ = false;
+  force_ = Vec3::Zero();
+  if (piece_ != nullptr) touch(inertia, v);
+  p_ += kStep * v;
+  v_ = v;
+  p_tool_ = pose.p_WT;
+  return pose.R_WT.transpose() * (p_ - pose.p_WT);
+}
+
+void ProbeContact::touch(double inertia, Vec3& v) {
+  surface_ = piece_->nearest(p_ + kStep * v, surface_);
+  const double gap = surface_.distance - probe_.ball_radius;
+  if (!surface_.valid || gap >= 0) return;
+  touching_ = true;
+  const Vec3& n = surface_.n;
+  const double push = -gap / kStep;  // change of velocity that ends the step on the surface
+  v += push * n;
+  force_ = n * (push * inertia / kStep);
+  if (effects_.surface_friction > 0) {
+    const Vec3 sliding = v - n * n.dot(v);
+    const double speed = sliding.norm();
+    if (speed > 0) {
+      const Vec3 change = sliding * -std::min(1.0, effects_.surface_friction * push / speed);
+      v += change;
+      force_ += change * (inertia / kStep);
+    }
+  }
+}
+
+}  // namespace vcnc

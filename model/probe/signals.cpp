@@ -1,0 +1,101 @@
+#include "model/probe/signals.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "model/probe/noise.hpp"
+
+namespace vcnc {
+namespace {
+
+constexpr double kSampleTime = 100e-6;  // [s]
+constexpr double kNominalAmplitude = 0.5;
+constexpr double kLeastShare = 0.6, kMostShare = 1.4;  // of the amplitude
+constexpr double kLargestStep = 0.8 * kPi, kLargestChange = 0.5 * kPi;
+constexpr std::uint64_t kAdcNoiseStream = 0x100, kAdcJitterStream = 0x200;
+
+double wrap(double angle) { return angle - 2 * kPi * std::round(angle / (2 * kPi)); }
+
+}  // namespace
+
+double Adc::lsb() const { return std::ldexp(kReference, -bits); }
+
+std::uint16_t Adc::code(double signal) const {
+  const double most = std::ldexp(1.0, bits) - 1;
+  return static_cast<std::uint16_t>(
+      std::clamp(std::round((kMiddle + kGain * signal) / lsb()), 0.0, most));
+}
+
+double Adc::signal(std::uint16_t code) const { return (code * lsb() - kMiddle) / kGain; }
+
+bool Adc::clipped(std::uint16_t code) const { return code == 0 || code == (1 << bits) - 1; }
+
+double Unwrapper::step(double phase) {
+  if (seen_ == 0) {
+    total_ = phase;
+  } else {
+    const double d = wrap(phase - phase_);
+    if (std::abs(d) > kLargestStep) slipped_ = true;
+    if (seen_ > 1 && std::abs(wrap(d - last_step_)) > kLargestChange) slipped_ = true;
+    total_ += d;
+    last_step_ = d;
+  }
+  phase_ = phase;
+  seen_ = std::min(seen_ + 1, 2);
+  return total_;
+}
+
+SignalChannel::SignalChannel(const ProbeParams& probe, const ProbeEffects& effects, int component,
+                             std::uint64_t seed)
+    : period_(probe.signal_period),
+      adc_{probe.adc_bits},
+      correction_(probe.correction),
+      truth_{kNominalAmplitude, 1 / (1 + effects.sin_gain[component]),
+             kNominalAmplitude * effects.cos_offset[component],
+             kNominalAmplitude * effects.sin_offset[component], effects.phase[component]},
+      noise_(effects.adc_noise / Adc::kGain),
+      jitter_(effects.adc_jitter),
+      seed_(seed),
+      stream_(static_cast<std::uint64_t>(component)) {}
+
+ChannelSample SignalChannel::sample(double true_deflection) {
+  double x = true_deflection;
+  if (jitter_ > 0 && counter_ > 0) {
+    // One clock triggers all channels: they share the stream.
+    const double late = jitter_ * gaussian_noise(seed_, kAdcJitterStream, counter_)[0];
+    x += (true_deflection - last_deflection_) / kSampleTime * late;
+  }
+  SinCos analogue = truth_.signals(2 * kPi / period_ * x);
+  if (noise_ > 0) {
+    const auto [a, b] = gaussian_noise(seed_, kAdcNoiseStream + stream_, counter_);
+    analogue.u += noise_ * a;
+    analogue.w += noise_ * b;
+  }
+  last_deflection_ = true_deflection;
+  ++counter_;
+
+  ChannelSample result;
+  result.cos_code = adc_.code(analogue.u);
+  result.sin_code = adc_.code(analogue.w);
+  SinCos digital{adc_.signal(result.cos_code), adc_.signal(result.sin_code)};
+  double amplitude = kNominalAmplitude;
+  if (correction_ == ProbeParams::Correction::heydemann) {
+    digital = corrector_.correct(digital);
+    if (corrector_.ellipse()) amplitude = corrector_.ellipse()->amplitude;
+  }
+  const double share = std::hypot(digital.u, digital.w) / amplitude;
+  result.fault = share < kLeastShare || share > kMostShare || adc_.clipped(result.cos_code) ||
+                 adc_.clipped(result.sin_code);
+  check_slip_ = check_slip_ || share < kLeastShare || share > kMostShare;
+  result.deflection = unwrapper_.step(std::atan2(digital.w, digital.u)) * period_ / (2 * kPi);
+  result.slip = check_slip_ || unwrapper_.slipped();
+  return result;
+}
+
+int SignalChannel::check_zero() {
+  const int periods = static_cast<int>(std::lround(unwrapper_.total() / (2 * kPi)));
+  if (periods != 0) check_slip_ = true;
+  return periods;
+}
+
+}  // namespace vcnc

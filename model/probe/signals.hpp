@@ -1,0 +1,87 @@
+// From a deflection to converter codes and back: one channel of the probe and its acquisition module.
+//
+//   phase     phi = 2 pi x / signal period
+//   signals   u = R1 cos phi + p,  w = R2 sin(phi - alpha) + q,  R1 = 0.5 V (1 Vpp), errors per channel
+//   front end V = 1.65 V + 2.5 u
+//   ADC       code = round((V + noise) / q) clamped to 0 .. 2^N - 1,  q = 3.3 V / 2^N, N = 12 or 16; both
+//             signals at the same instant, which jitters: x is taken at x + x' dt_jitter
+//   phase     phi^ = atan2(w', u'), with or without the correction of model/probe/heydemann.hpp
+//   unwrap    sum of the steps d = wrap(phi^_k - phi^_k-1); x^ = sum * period / 2 pi
+// The count is free of slips while |x'| < period / (2 * 100 us), 100 mm/s at 20 um; half of that is the
+// design limit. A slip is flagged and stays flagged, never repaired: |d| > 0.8 pi, a step that
+// differs from the last one by more than pi / 2, a signal amplitude outside 0.6 .. 1.4 of R1, or a free
+// probe that does not read zero (check_zero). Errors of 12-bit conversion: 1 / 1551 rad, 2.05 nm at 20 um.
+// Source: 1 Vpp interface; converter data of STM32F4/H7 class parts. Not modelled: anti-alias filter,
+// integral non-linearity, crosstalk between channels.
+#pragma once
+
+#include <cstdint>
+
+#include "model/machine.hpp"
+#include "model/probe/heydemann.hpp"
+
+namespace vcnc {
+
+/// Front end and converter.
+struct Adc {
+  int bits = 16;
+  static constexpr double kReference = 3.3, kMiddle = 1.65, kGain = 2.5;
+
+  double lsb() const;                         ///< [V] at the converter
+  std::uint16_t code(double signal) const;    ///< signal [V] before the front end
+  double signal(std::uint16_t code) const;
+  bool clipped(std::uint16_t code) const;
+};
+
+/// Counts periods. Positions in radians of the signal.
+class Unwrapper {
+ public:
+  /// Adds the next phase in (-pi, pi]; the first one is taken as it is.
+  double step(double phase);
+  double total() const { return total_; }
+  bool slipped() const { return slipped_; }
+  /// Starts anew: the next phase is taken as it is.
+  void reset() { *this = {}; }
+
+ private:
+  double phase_ = 0, total_ = 0, last_step_ = 0;
+  int seen_ = 0;
+  bool slipped_ = false;
+};
+
+struct ChannelSample {
+  std::uint16_t cos_code = 0, sin_code = 0;
+  double deflection = 0;  ///< what the module makes of them [m]
+  bool slip = false;      ///< periods were lost at some time since the last zero
+  bool fault = false;     ///< amplitude out of bounds or converter at its end, now
+};
+
+/// One of the three channels x, y, z. Call sample() every 100 us.
+class SignalChannel {
+ public:
+  /// `component` 0, 1, 2; `seed` of the scenario.
+  SignalChannel(const ProbeParams& probe, const ProbeEffects& effects, int component,
+                std::uint64_t seed);
+
+  ChannelSample sample(double true_deflection);
+
+  /// For a probe known to be free: whole periods that the reading is off (0: none); flags a slip
+  /// otherwise.
+  int check_zero();
+  /// Takes the probe to be free now and starts counting from there; clears the slip.
+  void set_zero() { unwrapper_.reset(); check_slip_ = false; }
+
+ private:
+  double period_;
+  Adc adc_;
+  ProbeParams::Correction correction_;
+  Lissajous truth_;          ///< what the sensor really draws
+  double noise_, jitter_;
+  std::uint64_t seed_, stream_, counter_ = 0;
+  double last_deflection_ = 0;
+  OnlineCorrector corrector_;
+  Unwrapper unwrapper_;
+  bool check_slip_ = false;  ///< a zero check or the amplitude found a slip
+};
+
+}  // namespace vcnc

@@ -1,0 +1,48 @@
+// The scanning probe on the bus: contact physics, sin/cos signals, acquisition module.
+//
+// Cycle k: the true axis motion of cycle k-1 comes through the truth channel, ten samples of 100 us. For
+// each of them the stylus ball is moved on the piece (ProbeContact) and the three channels are
+// digitised (SignalChannel). The last sample is the deflection at t_k and goes out as ProbeSample.
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "bus/messages.hpp"
+#include "bus/node.hpp"
+#include "bus/truth.hpp"
+#include "model/geometry/kinematics.hpp"
+#include "model/geometry/piece.hpp"
+#include "model/machine.hpp"
+#include "model/probe/contact.hpp"
+#include "model/probe/signals.hpp"
+
+namespace vcnc {
+
+class ProbeNode : public Node {
+ public:
+  /// `piece` may be null: nothing to touch. `truth` outlives the node.
+  ProbeNode(const Machine& machine, std::unique_ptr<Piece> piece, std::uint64_t seed, TruthPort& truth);
+
+  int id() const override { return kProbeNode; }
+  std::string_view name() const override { return "probe"; }
+  bool accepts(std::uint16_t) const override { return false; }
+  void step(Tick k, std::span<const Frame> inputs, Frames& out) override;
+
+ private:
+  ToolPose pose(const std::array<TruthCycle, kTruthAxes>& truth, std::size_t sample) const;
+  void sample(const ToolPose& pose);
+  ProbeSample reading(Tick k, bool truth_lost) const;
+
+  ProbeParams probe_;
+  UsableRange range_;
+  Kinematics kinematics_;
+  std::unique_ptr<Piece> piece_;
+  ProbeContact contact_;
+  std::array<SignalChannel, 3> channels_;
+  std::array<ChannelSample, 3> last_;
+  TruthPort& truth_;
+  AxisVector start_;
+};
+
+}  // namespace vcnc

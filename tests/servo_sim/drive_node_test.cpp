@@ -1,0 +1,98 @@
+#include "servo_sim/drive_node.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace vcnc {
+namespace {
+
+/// One drive X alone on a bus that the test plays by hand.
+class DriveNodeTest : public testing::Test {
+ protected:
+  DriveNodeTest() : truth_(open_local_truth()), node_(kX, machine_, *truth_) {}
+
+  DriveStatus cycle(std::uint16_t controlword, double position = 0, bool tripped = false, bool command = true) {
+    Frames inputs, out;
+    OvertravelState guard;
+    if (tripped) guard.state = OvertravelState::State::tripped;
+    inputs.push_back(encode(guard));
+    if (command) {
+      GroupCommand c;
+      c.controlword = controlword;
+      c.axes[kX].position = position;
+      inputs.push_back(encode(c));
+    }
+    node_.step(k_++, inputs, out);
+    emergencies_ += static_cast<int>(out.size()) - 1;
+    return decode_drive_status(out.at(0)).value();
+  }
+  void enable() {
+    for (std::uint16_t cw : {cia402::kShutdown, cia402::kShutdown, cia402::kSwitchOn, cia402::kEnable, cia402::kEnable}) cycle(cw);
+  }
+
+  Machine machine_;
+  std::unique_ptr<TruthPort> truth_;
+  DriveNode node_;
+  Tick k_ = 0;
+  int emergencies_ = 0;
+};
+
+TEST_F(DriveNodeTest, ComesUpThroughTheStatesOfCia402) {
+  EXPECT_EQ(cia402::state_of(cycle(0).statusword), cia402::State::switch_on_disabled);
+  EXPECT_EQ(cia402::state_of(cycle(cia402::kShutdown).statusword), cia402::State::ready);
+  EXPECT_EQ(cia402::state_of(cycle(cia402::kSwitchOn).statusword), cia402::State::switched_on);
+  EXPECT_EQ(cia402::state_of(cycle(cia402::kEnable).statusword), cia402::State::operation_enabled);
+}
+
+TEST_F(DriveNodeTest, DoesNotFollowBeforeItIsEnabled) {
+  for (int i = 0; i < 50; ++i) EXPECT_NEAR(cycle(0, 0.01).position, 0, 1e-9);
+}
+
+TEST_F(DriveNodeTest, FollowsOnceEnabledAndStampsTheInstantOfThePosition) {
+  enable();
+  DriveStatus status;
+  for (int i = 0; i < 2000; ++i) status = cycle(cia402::kEnable, 1e-3 * std::min(1.0, i / 1000.0));
+  EXPECT_NEAR(status.position, 1e-3, 1e-7);
+  EXPECT_EQ(status.tick, low16(k_));  // k_ is already the next cycle: the end of the last one
+  std::array<TruthCycle, kTruthAxes> unused;
+  EXPECT_FALSE(truth_->collect(k_ - 1, unused));  // the other four axes are not there
+}
+
+TEST_F(DriveNodeTest, ATripStopsItInTheCycleAfterTheMessage) {
+  enable();
+  for (int i = 0; i < 100; ++i) cycle(cia402::kEnable, 1e-5 * i);
+  const DriveStatus status = cycle(cia402::kEnable, 1e-5 * 100, true);
+  EXPECT_EQ(cia402::state_of(status.statusword), cia402::State::quick_stop);
+  double last = status.position;
+  for (int i = 0; i < 200; ++i) last = cycle(cia402::kEnable, 1, true).position;
+  EXPECT_NEAR(cycle(cia402::kEnable, 1, true).position, last, 1e-9);  // at rest, whatever is commanded
+  EXPECT_LT(last, 2e-3);
+  EXPECT_EQ(emergencies_, 0);  // the module that tripped reports it
+}
+
+TEST_F(DriveNodeTest, StopsWithAnEmergencyWhenTheCommandIsLost) {
+  enable();
+  for (int i = 0; i < 20; ++i) cycle(cia402::kEnable, 0);
+  for (int i = 0; i < kSilentCyclesAllowed; ++i)
+    EXPECT_EQ(cia402::state_of(cycle(0, 0, false, false).statusword), cia402::State::operation_enabled);
+  EXPECT_EQ(cia402::state_of(cycle(0, 0, false, false).statusword), cia402::State::quick_stop);
+  EXPECT_EQ(emergencies_, 1);
+}
+
+TEST_F(DriveNodeTest, StopsWhenTheOvertravelModuleFallsSilent) {
+  enable();
+  Frames out;
+  GroupCommand c;
+  c.controlword = cia402::kEnable;
+  const Frames only_command{encode(c)};
+  for (int i = 0; i <= kSilentCyclesAllowed; ++i) {
+    out.clear();
+    node_.step(k_++, only_command, out);
+  }
+  EXPECT_EQ(cia402::state_of(decode_drive_status(out.at(0))->statusword), cia402::State::quick_stop);
+  EXPECT_EQ(decode_emergency(out.at(1))->code, 0x8130);
+}
+
+}  // namespace
+}  // namespace vcnc
