@@ -90,6 +90,7 @@ void Evaluation::on_path(const EvaluatedRow& row) {
     return;
   }
   ++on_path_rows_;
+  last_station_ = std::max(last_station_, place.s);
   const double depth = machine_.probe.ball_radius - e.distance;
   const double bin = depth / kInterferenceStep + 0.5;
   if (bin >= 0 && bin < kInterferenceBins) ++interference_[static_cast<std::size_t>(bin)];
@@ -207,6 +208,7 @@ Summary Evaluation::finish(const RunEnd& end) const {
     s.bin_length = coverage_.bin_length();
     s.coverage_percent = coverage_.percent();
   }
+  s.last_station = last_station_;
   judge(s);
   warn(s);
   return s;

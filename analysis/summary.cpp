@@ -3,15 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "model/math.hpp"
 
 namespace vcnc {
 namespace {
 
+/// Micrometres as they are shown with two decimals, never "-0.00".
+double um(double metres) { return std::round(metres * 1e8) / 100 + 0.0; }
+
 std::string error_line(const char* name, const Statistics& s) {
-  return fmt::format("  {:<9}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}\n", name, s.max * 1e6,
-                     s.min * 1e6, s.mean() * 1e6, s.rms() * 1e6, s.peak_to_peak() * 1e6);
+  return fmt::format("  {:<9}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}\n", name, um(s.max), um(s.min),
+                     um(s.mean()), um(s.rms()), um(s.peak_to_peak()));
 }
 
 std::string errors(const Summary& s) {

@@ -105,6 +105,42 @@ void start_modules(Launcher& launcher, const RunOptions& options, const RunFolde
   launcher.wait_all_ready(kReadyTimeoutMs);
 }
 
+struct RunEnded {
+  int nc_code = kExitFailure;
+  std::string failure;  ///< the first one; what follows from it is not told
+};
+
+/// Shows the progress until every process has ended; sees to it that they do.
+RunEnded watch(Launcher& launcher) {
+  constexpr int kStepMs = 100;
+  ProgressLine progress;
+  RunEnded ended;
+  bool told_to_stop = false, ending = false;
+  int patience_ms = 0;
+  while (launcher.running() > 0) {
+    if (stop_requested() && !told_to_stop) {
+      told_to_stop = true;
+      progress.show("stopping ...");
+      launcher.signal("NC unit", SIGTERM);
+    }
+    const auto exited = launcher.next(kStepMs, [&](const std::string& text) { progress.show(text); });
+    if (exited) {
+      const bool nc = exited->name == "NC unit";
+      if (nc) ended.nc_code = exited->code;
+      const bool expected = exited->code == kExitOk || (nc && exited->last_words.empty());
+      if (!expected && ended.failure.empty()) ended.failure = exited->sentence();
+      const bool analysis_died = exited->name == "analysis" && launcher.running("NC unit");
+      if (analysis_died) launcher.signal("NC unit", SIGTERM);
+      ending = ending || nc || analysis_died;
+      patience_ms = launcher.running("analysis") ? kResultsTimeoutMs : kStopTimeoutMs;
+    } else if (ending && (patience_ms -= kStepMs) <= 0) {
+      if (ended.failure.empty()) ended.failure = "modules still ran after the end of the run and were killed";
+      launcher.kill_all();
+    }
+  }
+  return ended;
+}
+
 int run_processes(const RunOptions& options, const RunFolder& folder) {
   SocketFolder sockets;
   std::string bus = options.bus;
@@ -122,33 +158,10 @@ int run_processes(const RunOptions& options, const RunFolder& folder) {
                              fs::absolute(options.program).string(), "--bus", bus, "--pace", fmt::format("{}", options.pace),
                              "--seed", std::to_string(options.seed)});
 
-  ProgressLine progress;
-  std::string failure;  // the first one; what follows from it is not told
-  std::optional<int> nc_code;
-  bool told_to_stop = false;
-  int patience_ms = kStopTimeoutMs;
-  while (launcher.running() > 0) {
-    if (stop_requested() && !told_to_stop) {
-      told_to_stop = true;
-      progress.show("stopping ...");
-      launcher.signal("NC unit", SIGTERM);
-    }
-    constexpr int kStepMs = 100;
-    const auto exited = launcher.next(kStepMs, [&](const std::string& text) { progress.show(text); });
-    if (exited) {
-      if (exited->name == "NC unit") nc_code = exited->code;
-      const bool expected = exited->code == kExitOk || (exited->name == "NC unit" && exited->last_words.empty());
-      if (!expected && failure.empty()) failure = exited->sentence();
-      patience_ms = launcher.running("analysis") ? kResultsTimeoutMs : kStopTimeoutMs;
-    } else if (nc_code && (patience_ms -= kStepMs) <= 0) {
-      if (failure.empty()) failure = "modules still ran after the end of the run and were killed";
-      launcher.kill_all();
-    }
-  }
-  progress.clear();
+  const RunEnded ended = watch(launcher);
   std::cout << text_of(folder.path() / "summary.txt");
-  if (failure.empty()) return nc_code.value_or(kExitFailure);
-  std::cerr << "vcnc: " << failure << '\n';
+  if (ended.failure.empty()) return ended.nc_code;
+  std::cerr << "vcnc: " << ended.failure << '\n';
   return kExitFailure;
 }
 

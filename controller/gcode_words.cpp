@@ -65,9 +65,9 @@ std::vector<Word> split_words(std::string_view line, const std::string& where) {
       continue;
     }
     if (!is_letter(c))
-      throw ProgramError(fmt::format(
-          "{}: unexpected {}; a word is a letter followed by a number{}", where, show(c),
-          c == '/' ? ", and block delete is not supported" : ""));
+      throw ProgramError(fmt::format("{}: unexpected {}; a word is a letter followed by a number{}",
+                                     where, show(c),
+                                     c == '/' ? ", and block delete is not supported" : ""));
     ++i;
     skip_blanks();
     const std::string_view number = number_at(line, i);
@@ -89,8 +89,7 @@ std::vector<Word> split_words(std::string_view line, const std::string& where) {
 ProgramLines::ProgramLines(const std::string& path) : path_(path) {
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status))
-    throw ProgramError(path + ": no such program file");
+  if (!std::filesystem::exists(status)) throw ProgramError(path + ": no such program file");
   if (std::filesystem::is_directory(status))
     throw ProgramError(path + ": is a directory, not a program file");
   file_.open(path, std::ios::binary);

@@ -1,8 +1,8 @@
 // A program file as a stream of lines, and a line as a list of words.
 //
 // A word is a letter and a number: "G1", "x -12.5". Comments are ( ... ) and everything after ';'.
-// A line whose first character is '%' is a header. Lower case is taken as upper case; spaces between
-// words, and between a letter and its number, mean nothing. Anything else is refused.
+// A line whose first character is '%' is a header. Lower case is taken as upper case; spaces
+// between words, and between a letter and its number, mean nothing. Anything else is refused.
 #pragma once
 
 #include <fstream>

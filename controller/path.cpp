@@ -223,7 +223,8 @@ double Path::largest_width(double s, double from, double cap) const {
   if (from > good && from < bad) {
     if (within_tolerance(s, from, tolerance)) {
       good = from;
-      if (!within_tolerance(s, std::min(from * 1.2, bad), tolerance)) bad = std::min(from * 1.2, bad);
+      if (!within_tolerance(s, std::min(from * 1.2, bad), tolerance))
+        bad = std::min(from * 1.2, bad);
     } else {
       bad = from;
       if (from / 1.2 > good && within_tolerance(s, from / 1.2, tolerance)) good = from / 1.2;
@@ -266,11 +267,11 @@ std::vector<Path::Bound> Path::width_bounds() const {
 void Path::build_width(const std::vector<Bound>& bounds) {
   std::vector<Bound> envelope = bounds;
   for (std::size_t i = 1; i < envelope.size(); ++i)
-    envelope[i].h = std::min(
-        envelope[i].h, envelope[i - 1].h + kWidthSlope * (envelope[i].s - envelope[i - 1].s));
+    envelope[i].h = std::min(envelope[i].h,
+                             envelope[i - 1].h + kWidthSlope * (envelope[i].s - envelope[i - 1].s));
   for (std::size_t i = envelope.size() - 1; i-- > 0;)
-    envelope[i].h = std::min(
-        envelope[i].h, envelope[i + 1].h + kWidthSlope * (envelope[i + 1].s - envelope[i].s));
+    envelope[i].h = std::min(envelope[i].h,
+                             envelope[i + 1].h + kWidthSlope * (envelope[i + 1].s - envelope[i].s));
 
   const auto envelope_at = [&](double s) {
     const auto next = std::upper_bound(envelope.begin() + 1, envelope.end() - 1, s,

@@ -6,15 +6,15 @@
 // smoothed by a moving average with a hat kernel k of half width h(s):
 //   x(s) = int_{-1}^{1} r(s + h(s) u) k(u) du,   k(u) = 1 - |u|
 // Beyond its ends r is continued by point reflection, r(-s) = 2 r(0) - r(s), so end points are met
-// exactly. x is C2 with a bounded third derivative. With t the unit tangent and kappa the curvature of
-// r, for constant h:
+// exactly. x is C2 with a bounded third derivative. With t the unit tangent and kappa the curvature
+// of r, for constant h:
 //   corner     |x - r| = |t2 - t1| h / 6
 //   curve      |x - r| = kappa h^2 / 12
 // so h(s) follows from the tolerance; where it has to change it does so slowly (slope below
-// kWidthSlope between the constraints), by C2 steps. Arcs are kept within kArcTolerance whatever the
-// tolerance is, so that a circle keeps its radius.
-// Source: the two-fold average is the B-spline filter of order 2 (Biagiotti, Melchiorri, Trajectory
-// Planning for Automatic Machines and Robots, ch. 4); the variable width and its bound are our own.
+// kWidthSlope between the constraints), by C2 steps. Arcs are kept within kArcTolerance whatever
+// the tolerance is, so that a circle keeps its radius. Source: the two-fold average is the B-spline
+// filter of order 2 (Biagiotti, Melchiorri, Trajectory Planning for Automatic Machines and Robots,
+// ch. 4); the variable width and its bound are our own.
 #pragma once
 
 #include <vector>
@@ -39,9 +39,9 @@ PathPoint programmed_point(const PathSegment& segment, double s);
 
 class Path {
  public:
-  static constexpr double kRotaryLength = 0.01;   ///< w [m/rad]
-  static constexpr double kArcTolerance = 1e-7;   ///< [m]
-  static constexpr double kLargestWidth = 5e-3;   ///< of h, in s [m]
+  static constexpr double kRotaryLength = 0.01;  ///< w [m/rad]
+  static constexpr double kArcTolerance = 1e-7;  ///< [m]
+  static constexpr double kLargestWidth = 5e-3;  ///< of h, in s [m]
   static constexpr double kWidthSlope = 0.15;
 
   /// Moves must follow each other without a gap and share one frame. `angle_tolerance` [rad] bounds

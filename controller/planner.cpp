@@ -9,7 +9,7 @@
 namespace vcnc {
 namespace {
 
-constexpr double kAllowed = 1.0005;    ///< share of a limit that the check lets pass
+constexpr double kAllowed = 1.0005;  ///< share of a limit that the check lets pass
 constexpr double kRepairMargin = 0.98;
 constexpr int kScalings = 50;  ///< a few suffice; more would chase the rounding of tiny limits
 

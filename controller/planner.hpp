@@ -1,10 +1,11 @@
-// Motion of the axes along one run: q(t) with every axis within its velocity, acceleration and jerk.
+// Motion of the axes along one run: q(t) with every axis within its velocity, acceleration and
+// jerk.
 //
-// The speed law (planner_law.hpp) is found from the limits along the path (planner_limits.hpp). What
-// the axes will then really do is checked: differences of q at the bus cycle up to the third, the
-// velocity at each cycle and the feed. Where a limit is exceeded the law is made slower there and
-// found anew; if some excess remains after kRepairs, the whole run is scaled in time, which lowers
-// velocities, accelerations and jerks everywhere.
+// The speed law (planner_law.hpp) is found from the limits along the path (planner_limits.hpp).
+// What the axes will then really do is checked: differences of q at the bus cycle up to the third,
+// the velocity at each cycle and the feed. Where a limit is exceeded the law is made slower there
+// and found anew; if some excess remains after kRepairs, the whole run is scaled in time, which
+// lowers velocities, accelerations and jerks everywhere.
 #pragma once
 
 #include "controller/planner_law.hpp"
@@ -27,6 +28,8 @@ class Trajectory {
   MotionSample at(double t) const;  ///< t is clamped to [0, duration]
   const Path& path() const { return path_; }
   int repairs() const { return repairs_; }  ///< how often the law was found anew
+  double window() const { return law_.window(); }
+  double pace() const { return law_.pace(); }  ///< below 1: the whole run was scaled
 
  private:
   struct Excess;

@@ -8,14 +8,16 @@
 namespace vcnc {
 namespace {
 
+/// The averaged position is ahead of or behind the middle of the window where the speed changes.
+constexpr double kReach = 1.1;
+
 /// Each limit v spread over +- v T/2: the least of all that reach a node.
 std::vector<double> spread_limits(const std::vector<LimitNode>& nodes, double window) {
   const std::size_t n = nodes.size();
   std::vector<std::size_t> order(n);
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return nodes[a].v_max < nodes[b].v_max;
-  });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return nodes[a].v_max < nodes[b].v_max; });
   // From the slowest on, paint what is not painted yet; next_free skips what is.
   std::vector<double> v(n, 0);
   std::vector<std::size_t> next_free(n + 1);
@@ -27,12 +29,14 @@ std::vector<double> spread_limits(const std::vector<LimitNode>& nodes, double wi
     return root;
   };
   for (const std::size_t j : order) {
-    const double limit = nodes[j].v_max, reach = 0.5 * limit * window;
-    const auto first = std::lower_bound(
-        nodes.begin(), nodes.end(), nodes[j].s - reach,
-        [](const LimitNode& node, double s) { return node.s < s; });
-    for (std::size_t i = find_free(static_cast<std::size_t>(first - nodes.begin()));
-         i < n && nodes[i].s <= nodes[j].s + reach; i = find_free(i)) {
+    const double limit = nodes[j].v_max, reach = kReach * 0.5 * limit * window;
+    const auto below = [](const LimitNode& node, double s) { return node.s < s; };
+    const auto first = std::lower_bound(nodes.begin(), nodes.end(), nodes[j].s - reach, below);
+    const auto last = std::lower_bound(first, nodes.end(), nodes[j].s + reach, below);
+    // One node more at each end: from there on the speed rises.
+    const auto begin = static_cast<std::size_t>(first - nodes.begin());
+    const auto end = std::min(n, static_cast<std::size_t>(last - nodes.begin()) + 1);
+    for (std::size_t i = find_free(begin > 0 ? begin - 1 : 0); i < end; i = find_free(i)) {
       v[i] = limit;
       next_free[i] = i + 1;
     }
@@ -43,8 +47,8 @@ std::vector<double> spread_limits(const std::vector<LimitNode>& nodes, double wi
 /// Largest v at one node that is reached from the speed `from` at the other.
 double reachable(const LimitNode& a, const LimitNode& b, double from, double window,
                  const MotionLimits& limits) {
-  const double acceleration = std::min(a.acceleration(from, window, limits),
-                                       b.acceleration(from, window, limits));
+  const double acceleration =
+      std::min(a.acceleration(from, window, limits), b.acceleration(from, window, limits));
   return std::sqrt(from * from + 2 * acceleration * std::abs(b.s - a.s));
 }
 
@@ -108,9 +112,9 @@ LawPoint SpeedLaw::at(double t) const {
   const double lo = std::max(from, 0.0), hi = std::min(t, end);
   for (std::size_t cell = index(lo); cell + 1 < knots_.size() && knots_[cell].t < hi; ++cell) {
     const double a = std::max(lo, knots_[cell].t), b = std::min(hi, knots_[cell + 1].t);
-    sum += (b - a) / 6 *
-           (raw_in(cell, a).s + 4 * raw_in(cell, 0.5 * (a + b)).s + raw_in(cell, b).s -
-            6 * reference);
+    sum +=
+        (b - a) / 6 *
+        (raw_in(cell, a).s + 4 * raw_in(cell, 0.5 * (a + b)).s + raw_in(cell, b).s - 6 * reference);
   }
   return {reference + sum / window_, pace_ * (reference - raw(from).s) / window_};
 }

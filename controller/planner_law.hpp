@@ -27,6 +27,7 @@ class SpeedLaw {
 
   double duration() const { return (knots_.back().t + window_) / pace_; }
   double window() const { return window_ / pace_; }
+  double pace() const { return pace_; }
   LawPoint at(double t) const;
   /// Position before averaging: what the limits at a node have an influence on.
   double raw_position(double t) const { return raw(pace_ * t).s; }

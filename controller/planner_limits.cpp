@@ -39,10 +39,16 @@ double feed_limit(const Path& path, double s, const Coordinates& dx) {
   const PathSegment& segment = path.segment(s);
   double pace = 1;
   switch (segment.move.feed_mode) {
-    case Move::Feed::none: return kNone;
-    case Move::Feed::time: return segment.length / segment.move.feed;
-    case Move::Feed::tip: pace = dx.head<3>().norm(); break;
-    case Move::Feed::rotary: pace = dx.tail<2>().norm(); break;
+    case Move::Feed::none:
+      return kNone;
+    case Move::Feed::time:
+      return segment.length / segment.move.feed;
+    case Move::Feed::tip:
+      pace = dx.head<3>().norm();
+      break;
+    case Move::Feed::rotary:
+      pace = dx.tail<2>().norm();
+      break;
   }
   return pace > kStill ? segment.move.feed / pace : kNone;
 }
@@ -69,8 +75,8 @@ std::vector<LimitNode> limit_nodes(const Path& path, const FrameMap& map,
     node.s = s;
     node.v_max = feed_limit(path, s, point.dx);
     if (s >= length) break;
-    const double step = std::min({path.half_width(s) / kStepsPerWidth, kLargestStep,
-                                  length / kFewestSteps});
+    const double step =
+        std::min({path.half_width(s) / kStepsPerWidth, kLargestStep, length / kFewestSteps});
     s = length - s < 1.5 * step ? length : s + step;
   }
 
@@ -85,10 +91,12 @@ std::vector<LimitNode> limit_nodes(const Path& path, const FrameMap& map,
   for (std::size_t j = 0; j < n; ++j) {
     const std::size_t left = j > 0 ? j - 1 : 0, right = std::min(j + 1, n - 1);
     LimitNode& node = nodes[j];
-    node.d1 = slope[left].cwiseAbs().cwiseMax(slope[j].cwiseAbs()).cwiseMax(slope[right].cwiseAbs());
-    node.d2 = second[std::min(left, n - 2)].cwiseAbs().cwiseMax(
-        second[std::min(j, n - 2)].cwiseAbs());
-    node.d3 = third[left].cwiseAbs().cwiseMax(third[j].cwiseAbs()).cwiseMax(third[right].cwiseAbs());
+    node.d1 =
+        slope[left].cwiseAbs().cwiseMax(slope[j].cwiseAbs()).cwiseMax(slope[right].cwiseAbs());
+    node.d2 =
+        second[std::min(left, n - 2)].cwiseAbs().cwiseMax(second[std::min(j, n - 2)].cwiseAbs());
+    node.d3 =
+        third[left].cwiseAbs().cwiseMax(third[j].cwiseAbs()).cwiseMax(third[right].cwiseAbs());
     for (Eigen::Index i = 0; i < 5; ++i) {
       if (node.d1[i] > 0) node.v_max = std::min(node.v_max, limits.velocity[i] / node.d1[i]);
       if (node.d2[i] > 0)

@@ -32,10 +32,9 @@ void check_travel(const Coordinates& q, const Machine& machine, const std::strin
     const double position = q[static_cast<Eigen::Index>(i)];
     if (position >= axis.min - kRounding && position <= axis.max + kRounding) continue;
     const double scale = is_rotary(i) ? kDegree : 1e-3;
-    throw ProgramError(fmt::format("{}: {} would reach {:.3f} {}; allowed is {:.3f} to {:.3f}",
-                                   where, kAxisNames[i], position / scale,
-                                   is_rotary(i) ? "deg" : "mm", axis.min / scale,
-                                   axis.max / scale));
+    throw ProgramError(fmt::format(
+        "{}: {} would reach {:.3f} {}; allowed is {:.3f} to {:.3f}", where, kAxisNames[i],
+        position / scale, is_rotary(i) ? "deg" : "mm", axis.min / scale, axis.max / scale));
   }
 }
 
@@ -49,8 +48,8 @@ void check_move(const Move& move, const Machine& machine, const std::string& pat
   }
   constexpr double kStep = 2e-3, kTurn = 2 * kDegree;
   const PathSegment segment = make_segment(move, 0);
-  const double turn = std::max((move.end - move.start).tail<2>().cwiseAbs().maxCoeff(),
-                               std::abs(move.arc.sweep));
+  const double turn =
+      std::max((move.end - move.start).tail<2>().cwiseAbs().maxCoeff(), std::abs(move.arc.sweep));
   const int parts = 1 + static_cast<int>(std::max(segment.length / kStep, turn / kTurn));
   for (int i = 0; i <= parts; ++i)
     check_travel(map.to_axes(programmed_point(segment, segment.length * i / parts).x), machine,
@@ -124,10 +123,18 @@ struct Player::State {
                               ? step.spindle_speed
                               : word.speed + step.spindle_speed;
     switch (word.mode) {
-      case Mode::off: step.spindle = Spindle::off; break;
-      case Mode::clockwise: step.spindle = Spindle::clockwise; break;
-      case Mode::counter_clockwise: step.spindle = Spindle::counter_clockwise; break;
-      case Mode::orient: step.spindle = Spindle::orient; break;
+      case Mode::off:
+        step.spindle = Spindle::off;
+        break;
+      case Mode::clockwise:
+        step.spindle = Spindle::clockwise;
+        break;
+      case Mode::counter_clockwise:
+        step.spindle = Spindle::counter_clockwise;
+        break;
+      case Mode::orient:
+        step.spindle = Spindle::orient;
+        break;
     }
     step.spindle_speed = word.speed;
     begin_wait(change / machine.spindle.acceleration +
@@ -162,8 +169,7 @@ struct Player::State {
 
 Player::Player(const std::string& path, const Machine& machine) {
   GcodeInterpreter check(path, machine);
-  for (Block block = check.next(); !std::holds_alternative<ProgramEnd>(block);
-       block = check.next())
+  for (Block block = check.next(); !std::holds_alternative<ProgramEnd>(block); block = check.next())
     if (const Move* move = std::get_if<Move>(&block)) check_move(*move, machine, path);
   state_ = std::make_unique<State>(path, machine);
 }

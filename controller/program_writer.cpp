@@ -12,9 +12,9 @@
 namespace vcnc {
 namespace {
 
-constexpr double kStationStep = 5e-5;                ///< of scan_path before thinning [m]
+constexpr double kStationStep = 5e-5;                    ///< of scan_path before thinning [m]
 constexpr double kAngleChordTolerance = 2e-3 * kDegree;  ///< of the tool axis between two points
-constexpr double kLongestChord = 2e-3;               ///< [m]
+constexpr double kLongestChord = 2e-3;                   ///< [m]
 
 [[noreturn]] void fail(const std::string& reason) { throw std::invalid_argument(reason); }
 
@@ -35,7 +35,8 @@ void check_options(const ProgramOptions& o) {
 }
 
 double predeflection(const Machine& machine, const ProgramOptions& o) {
-  const double value = o.predeflection_mm ? *o.predeflection_mm * 1e-3 : machine.setup.predeflection;
+  const double value =
+      o.predeflection_mm ? *o.predeflection_mm * 1e-3 : machine.setup.predeflection;
   if (!(value >= 0 && value < machine.probe.ball_radius))
     fail("predeflection_mm must be at least 0 and less than the ball radius");
   return value;
@@ -57,9 +58,7 @@ std::string modes(const ProgramOptions& o, int plane) {
                      plane, o.tolerance_um * 1e-3);
 }
 
-std::string go_home() {
-  return "G49\nG91\nG28 Z0\nG28 X0 Y0\nG28 A0 C0\nG90\nM30\n";
-}
+std::string go_home() { return "G49\nG91\nG28 Z0\nG28 X0 Y0\nG28 A0 C0\nG90\nM30\n"; }
 
 /// A decimal without "-0.00000".
 std::string decimal(double value, int digits) {
@@ -152,15 +151,14 @@ std::string scan_program(const std::string& what, const Machine& machine, const 
   std::vector<Station> closed = piece.scan_path(ball, interference, z, kStationStep);
   if ((closed.front().centre - closed.back().centre).norm() > 1e-9)
     fail("the piece has no closed scan path");
-  // Scan paths keep the material to the left of travel, so they run clockwise seen from above.
+  // Scan paths keep the material to the left of travel: counter-clockwise seen from above.
   if (o.direction == ProgramOptions::Direction::clockwise) {
     const double total = closed.back().s;
     std::reverse(closed.begin(), closed.end());
     for (Station& station : closed) station.s = total - station.s;
   }
   const double lap = closed.back().s, run_in = o.run_in_mm * 1e-3, first = lap / 8;
-  const std::vector<Station> stations =
-      unroll(closed, first - run_in, o.laps * lap + 2 * run_in);
+  const std::vector<Station> stations = unroll(closed, first - run_in, o.laps * lap + 2 * run_in);
   const std::vector<Pose> path = thin(poses(stations, machine), o.chord_tolerance_um * 1e-6);
   const Pose &begin = path.front(), &end = path.back();
   const Vec3 up(0, 0, o.clearance_mm * 1e-3);
@@ -217,8 +215,8 @@ Circle choose_circle(const Machine& machine, const Piece* piece, const ProgramOp
   if (o.plane != 17) fail("plane must be 17 for a circle in a ring");
   Vec3 centre = ring.centre;
   if (o.height_mm) centre.z() = *o.height_mm * 1e-3;
-  const auto path = piece->scan_path(machine.probe.ball_radius, predeflection(machine, o),
-                                     centre.z(), 1e-2);
+  const auto path =
+      piece->scan_path(machine.probe.ball_radius, predeflection(machine, o), centre.z(), 1e-2);
   const double radius = (path.front().centre - centre).head<2>().norm();
   return {centre, o.radius_mm ? *o.radius_mm * 1e-3 : radius, true};
 }
@@ -308,8 +306,8 @@ std::string step_program(const Machine& machine, const ProgramOptions& o) {
     fail(fmt::format("steps x step_size leads {} to {:.3f}; allowed is {:.3f} to {:.3f}",
                      kAxisNames[o.axis], last / scale, limits.min / scale, limits.max / scale));
 
-  std::string text = header(fmt::format("Steps of {} along {}", o.step_size, kAxisNames[o.axis]),
-                            machine, o);
+  std::string text =
+      header(fmt::format("Steps of {} along {}", o.step_size, kAxisNames[o.axis]), machine, o);
   text += fmt::format("({} forward and back, {} time{}, {:g} s dwell at each.)\n", o.steps, o.laps,
                       o.laps == 1 ? "" : "s", o.dwell_s);
   text += modes(o, 17);

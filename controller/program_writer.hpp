@@ -5,11 +5,11 @@
 //   circle    G2/G3 laps inside a ring gauge, or free in any plane; linear axes only
 //   step      one axis in equal steps forward and back, with a dwell: lost motion, stand-still
 //
-// Scan laps follow Piece::scan_path. The lap begins an eighth of its length behind the first station,
-// on a face and away from its ends, and is preceded and followed by a run-in and run-out of
-// `run_in_mm` over the same stations, so the lap itself is run at full feed. Stations are thinned:
-// of the straight line between two points no station is off by more than the chord tolerance.
-// Coordinates have 5 decimals [mm] and 6 decimals [deg]: rounding stays below 0.01 um.
+// Scan laps follow Piece::scan_path. The lap begins an eighth of its length behind the first
+// station, on a face and away from its ends, and is preceded and followed by a run-in and run-out
+// of `run_in_mm` over the same stations, so the lap itself is run at full feed. Stations are
+// thinned: of the straight line between two points no station is off by more than the chord
+// tolerance. Coordinates have 5 decimals [mm] and 6 decimals [deg]: rounding stays below 0.01 um.
 #pragma once
 
 #include <optional>
@@ -30,9 +30,9 @@ struct ProgramOptions {
   std::optional<double> height_mm;  ///< of the ball centre in the workpiece; default: mid-height
   std::optional<double> predeflection_mm;  ///< default: setup.predeflection of the machine
   double run_in_mm = 10;                   ///< before and after the lap
-  double approach_mm = 5;      ///< distance from the surface where the approach begins
-  double clearance_mm = 60;    ///< above the scan height: travel over the piece
-  double settle_s = 0.5;       ///< dwell between approach and lap
+  double approach_mm = 5;                  ///< distance from the surface where the approach begins
+  double clearance_mm = 60;                ///< above the scan height: travel over the piece
+  double settle_s = 0.5;                   ///< dwell between approach and lap
   int laps = 1;
   Direction direction = Direction::counter_clockwise;
 

@@ -68,7 +68,8 @@ struct DdsPublisher::State {
   void write_rows(std::uint64_t first_seq, std::uint64_t dropped_so_far);
   template <class T>
   void write(dds::Writer<T>& writer, const T& sample);
-  void read_progress();
+  std::size_t read_progress();  ///< returns the number of subscribers
+  bool anyone_behind(std::uint64_t seq);
   void await_window(std::uint64_t seq);
   bool is_stopping() {
     const std::lock_guard lock(mutex);
@@ -99,8 +100,10 @@ struct DdsPublisher::State {
   std::string run_id;
   std::vector<double> batch;
   std::uint32_t alarm_number = 0;
-  std::map<dds_instance_handle_t, std::uint64_t> subscribers;  ///< how far each of them is
   std::thread thread;
+
+  std::mutex subscribers_mutex;
+  std::map<dds_instance_handle_t, std::uint64_t> subscribers;  ///< how far each of them is
 };
 
 // ------------------------------------------------------------------ the machine's side
@@ -120,8 +123,7 @@ DdsPublisher::~DdsPublisher() {
 void DdsPublisher::wait_for_subscriber(int timeout_ms) {
   State& s = *state_;
   for (int waited_ms = 0;; waited_ms += kSliceMs) {
-    s.read_progress();
-    if (!s.subscribers.empty() && s.rows.matched() >= s.subscribers.size()) return;
+    if (const std::size_t n = s.read_progress(); n > 0 && s.rows.matched() >= n) return;
     if (waited_ms >= timeout_ms)
       throw DdsError("no analysis has subscribed to the telemetry within " +
                      std::to_string(timeout_ms) + " ms");
@@ -290,7 +292,8 @@ void DdsPublisher::State::write(dds::Writer<T>& writer, const T& sample) {
   if (result != DDS_RETCODE_TIMEOUT) check(result, "publishing");
 }
 
-void DdsPublisher::State::read_progress() {
+std::size_t DdsPublisher::State::read_progress() {
+  const std::lock_guard lock(subscribers_mutex);
   while (progress.take([&](const vcnc_dds_Progress* p, const dds_sample_info_t& info) {
     if (info.instance_state != DDS_IST_ALIVE) {
       subscribers.erase(info.instance_handle);
@@ -299,12 +302,18 @@ void DdsPublisher::State::read_progress() {
     }
   }) > 0) {
   }
+  return subscribers.size();
+}
+
+bool DdsPublisher::State::anyone_behind(std::uint64_t seq) {
+  const std::lock_guard lock(subscribers_mutex);
+  return std::any_of(subscribers.begin(), subscribers.end(),
+                     [&](const auto& s) { return s.second + options.window_rows < seq; });
 }
 
 void DdsPublisher::State::await_window(std::uint64_t seq) {
   read_progress();
-  const auto behind = [&](const auto& s) { return s.second + options.window_rows < seq; };
-  while (std::any_of(subscribers.begin(), subscribers.end(), behind) && !is_stopping()) {
+  while (anyone_behind(seq) && !is_stopping()) {
     check(dds_waitset_wait(waitset.get(), nullptr, 0, DDS_MSECS(kSliceMs)), "waiting");
     read_progress();
   }

@@ -7,11 +7,11 @@
 namespace vcnc {
 namespace {
 
-constexpr double kObserverRatio = 4;           // observer poles over velocity loop crossover
-constexpr double kFastestObserver = 5000;      // [rad/s], half of the loop rate
-constexpr double kContactResonance = 400;      // [Hz] of a gap without compliance
-constexpr double kLargestPlantAngle = 0.5;     // resonance [rad/s] times plant step
-constexpr double kStandingSpeed = 1e-3;        // [m/s or rad/s]
+constexpr double kObserverRatio = 4;        // observer poles over velocity loop crossover
+constexpr double kFastestObserver = 5000;   // [rad/s], half of the loop rate
+constexpr double kContactResonance = 400;   // [Hz] of a gap without compliance
+constexpr double kLargestPlantAngle = 0.5;  // resonance [rad/s] times plant step
+constexpr double kStandingSpeed = 1e-3;     // [m/s or rad/s]
 
 double observer_bandwidth(const ServoParams& servo) {
   return std::min(kObserverRatio * 2 * kPi * servo.velocity_bandwidth, kFastestObserver);
@@ -44,7 +44,8 @@ AxisDrive::AxisDrive(const AxisParams& params, const AxisEffects& effects)
       inertia_(params.mechanics.total_inertia()),
       motor_inertia_(params.mechanics.reflected_inertia()),
       kp_(2 * kPi * params.servo.velocity_bandwidth * inertia_),
-      lag_share_(params.servo.current_lag > 0 ? -std::expm1(-kPlantTime / params.servo.current_lag) : 1),
+      lag_share_(params.servo.current_lag > 0 ? -std::expm1(-kPlantTime / params.servo.current_lag)
+                                              : 1),
       two_masses_(effects.windup.compliance > 0 || effects.backlash.gap > 0),
       x_load_(params.limits.start),
       x_motor_(params.limits.start),
@@ -54,10 +55,12 @@ AxisDrive::AxisDrive(const AxisParams& params, const AxisEffects& effects)
   const double load = params.mechanics.load;
   if (!(motor_inertia_ > 1e-3 * load))
     throw std::invalid_argument(
-        "motor_inertia_kgm2: wind-up and backlash need a motor side of at least a thousandth of the load");
+        "motor_inertia_kgm2: wind-up and backlash need a motor side of at least a thousandth of "
+        "the load");
   const double reduced = load * motor_inertia_ / (load + motor_inertia_);
   double resonance = 2 * kPi * kContactResonance;
-  if (effects.windup.compliance > 0) resonance = std::sqrt(1 / (effects.windup.compliance * reduced));
+  if (effects.windup.compliance > 0)
+    resonance = std::sqrt(1 / (effects.windup.compliance * reduced));
   resonance = std::min(resonance, kLargestPlantAngle / kPlantTime);
   stiffness_ = resonance * resonance * reduced;
   damping_ = 2 * effects.windup.damping_ratio * resonance * reduced;
@@ -161,7 +164,8 @@ void AxisDrive::move_two_masses() {
   const double twist = x_motor_ - x_load_, half_gap = 0.5 * effects_.backlash.gap;
   double spring = 0;
   if (std::abs(twist) >= half_gap)
-    spring = stiffness_ * (twist - std::copysign(half_gap, twist)) + damping_ * (v_motor_ - v_load_);
+    spring =
+        stiffness_ * (twist - std::copysign(half_gap, twist)) + damping_ * (v_motor_ - v_load_);
   const double load = params_.mechanics.load;
   v_motor_ += kPlantTime * (force_ - spring) / motor_inertia_;
   v_load_ = friction_.step(v_load_, v_load_ + kPlantTime * spring / load, kPlantTime, load);

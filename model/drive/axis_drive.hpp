@@ -3,26 +3,36 @@
 //
 // Set-point: cubic Hermite interpolation between two bus set-points (position and velocity at both
 // ends), so that velocity and acceleration feed-forward are smooth.
+//
 // Every 100 us (loop step, T), at its instant t:
 //   v_ref = Kv (x_c - x_m) + kvff v_c
-//   F_ref = Kp (v_ref - v_m) + (Kp/Ti) int (v_ref - v_m) dt + kaff J a_c,  |F_ref| <= F_max, the integral
-//           is held while the force is limited;  Kp = 2 pi f_v J,  J = load + reflected motor inertia
+//   F_ref = Kp (v_ref - v_m) + (Kp/Ti) int (v_ref - v_m) dt + kaff J a_c
+//   |F_ref| <= F_max; the integral is held while the force is limited
+//   Kp    = 2 pi f_v J,  J = load + reflected motor inertia
 //   a_c   = (v_c(t + T) - v_c(t)) / T, the acceleration that the coming step needs on average
 //   x_m by the measuring system chosen (motor or load); v_m always of the motor side
-// Velocity v_m: an observer with position, velocity and disturbance (three equal poles at 4 x the velocity
-// loop's crossover) is driven by the measured motor position and the drive force. In smooth motion it
-// has no lag, because it knows the force, and it keeps the steps of a coarse encoder out of the force.
-// Every 50 us (plant step, dt), after a first-order lag tau_i of the force:
+//
+// Velocity v_m: an observer with position, velocity and disturbance (three equal poles at 4 x the
+// velocity loop's crossover) is driven by the measured motor position and the drive force. In
+// smooth motion it has no lag, because it knows the force, and it keeps the steps of a coarse
+// encoder out of the force.
+//
+// Every 50 us (plant step), after a first-order lag tau_i of the force:
 //   rigid (compliance 0, gap 0):   J x'' = F - F_f(x')
-//   two masses:  m_r x_m'' = F - F_s,   m x'' = F_s - F_f(x'),
-//     F_s = K g(x_m - x) + D (x_m' - x'), g(z) = z -+ b/2 outside the gap b and 0 inside (D off inside)
-//   backlash without compliance: the same with a contact stiffness that puts the resonance at 400 Hz.
-// Integration: rigid exactly for a force constant over the step; two masses by the symplectic Euler rule,
-// with K limited to a resonance of 1.6 kHz (10 kN then wind the spring up by less than 0.3 um on 500 kg).
-// Friction implicitly (model/drive/friction.hpp).
-// Source: Gross, Hamann, Wiegaertner, Electrical Feed Drives in Automation; Altintas et al., CIRP Annals
-// 60/2 (2011) 779; observer gains: Brookner, Tracking and Kalman Filtering Made Easy, critically damped
-// g-h-k filter. Not modelled: current ripple, thermal growth, cross-coupling between axes, gravity.
+//   two masses:  m_r x_m'' = F - F_s,   m x'' = F_s - F_f(x')
+//                F_s = K g(x_m - x) + D (x_m' - x')
+//                g(z) = z -+ b/2 outside the gap b, 0 inside (D off inside)
+//   backlash without compliance: the same with a contact stiffness of 400 Hz resonance
+//
+// Integration: rigid exactly for a force constant over the step; two masses by the symplectic Euler
+// rule, with K limited to a resonance of 1.6 kHz (10 kN then wind the spring up by less than
+// 0.3 um on 500 kg). Friction implicitly (model/drive/friction.hpp).
+//
+// Valid below about half the loop rate. Not modelled: current ripple, thermal growth, gravity,
+// cross-coupling between axes.
+// Source: Gross, Hamann, Wiegaertner, Electrical Feed Drives in Automation; Altintas et al., CIRP
+// Annals 60/2 (2011) 779; observer gains: the critically damped g-h-k filter of Brookner, Tracking
+// and Kalman Filtering Made Easy.
 #pragma once
 
 #include <array>
@@ -32,8 +42,8 @@
 
 namespace vcnc {
 
-inline constexpr int kDriveLoopSteps = 10;         ///< per bus cycle
-inline constexpr double kDriveLoopTime = 100e-6;   ///< [s]
+inline constexpr int kDriveLoopSteps = 10;        ///< per bus cycle
+inline constexpr double kDriveLoopTime = 100e-6;  ///< [s]
 inline constexpr int kPlantStepsPerLoop = 2;
 inline constexpr double kPlantTime = kDriveLoopTime / kPlantStepsPerLoop;
 
@@ -44,10 +54,10 @@ struct AxisSetpoint {
 
 /// What one cycle of the drive brought about.
 struct AxisCycle {
-  double measured = 0;      ///< position by the measuring system at the end of the cycle
-  double second = 0;        ///< load side minus motor side at the end of the cycle
-  double force = 0;         ///< drive force at the end, share of the limit
-  double velocity = 0;      ///< measured velocity at the end
+  double measured = 0;  ///< position by the measuring system at the end of the cycle
+  double second = 0;    ///< load side minus motor side at the end of the cycle
+  double force = 0;     ///< drive force at the end, share of the limit
+  double velocity = 0;  ///< measured velocity at the end
   std::array<double, kDriveLoopSteps> truth{};  ///< true load position at the end of each loop step
 };
 
@@ -71,9 +81,10 @@ class AxisDrive {
 
   /// Follows the set-point through one bus cycle (closed loop).
   AxisCycle follow(const AxisSetpoint& target);
-  /// Brakes with `deceleration` [m/s^2 or rad/s^2] along its own ramp through one cycle (quick stop).
+  /// Quick stop: brakes with `deceleration` [m/s^2 or rad/s^2] along its own ramp for one cycle.
   AxisCycle brake(double deceleration);
-  /// Holds position with the loop closed (also before the first set-point).
+  /// Holds the last commanded position with the loop closed (also before the first set-point); a
+  /// commanded velocity drops to zero at once.
   AxisCycle hold();
 
   bool standing() const;  ///< commanded and measured velocity are (nearly) zero

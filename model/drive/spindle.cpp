@@ -35,8 +35,8 @@ double SpindleDrive::toward_angle() const {
   const double distance = std::abs(ahead);
   // Square-root ramp far away; the line that touches it smoothly from there on.
   const double change = brake / (kOrientGain * kOrientGain);
-  const double speed = distance > change ? std::sqrt(2 * brake * (distance - 0.5 * change))
-                                         : kOrientGain * distance;
+  const double speed =
+      distance > change ? std::sqrt(2 * brake * (distance - 0.5 * change)) : kOrientGain * distance;
   return std::copysign(std::min(speed, params_.max_speed), ahead);
 }
 
@@ -48,10 +48,18 @@ SpindleCycle SpindleDrive::step(SpindleMode mode, double speed) {
   double target = 0;
   for (int i = 0; i < kDriveLoopSteps; ++i) {
     switch (mode) {
-      case SpindleMode::off: target = 0; break;
-      case SpindleMode::clockwise: target = magnitude; break;
-      case SpindleMode::counter_clockwise: target = -magnitude; break;
-      case SpindleMode::orient: target = toward_angle(); break;
+      case SpindleMode::off:
+        target = 0;
+        break;
+      case SpindleMode::clockwise:
+        target = magnitude;
+        break;
+      case SpindleMode::counter_clockwise:
+        target = -magnitude;
+        break;
+      case SpindleMode::orient:
+        target = toward_angle();
+        break;
     }
     const double most = params_.acceleration * kDriveLoopTime;
     const double before = speed_;

@@ -1,14 +1,15 @@
 // The spindle drive: ramp-limited speed, and orientation to an angle (M19).
 //
-//   speed        omega' = +-alpha towards the commanded speed, alpha the spindle's acceleration; the speed
-//                is clamped to max_speed
-//   orientation  the angle still to go, to the next free occurrence of the target in the direction of
-//                turning (the shorter way from rest), follows omega = sqrt(2 * 0.8 alpha * distance), the
+//   speed        omega' = +-alpha towards the commanded speed, alpha the spindle's acceleration;
+//                the commanded speed is clamped to max_speed
+//   orientation  to the next occurrence of the target that can be reached in the direction of
+//                turning (the shorter way from rest): omega = sqrt(2 * 0.8 alpha * distance), the
 //                speed from which 0.8 alpha just stops there; near the end it changes over to
-//                omega = kOrientGain * distance, so that the approach ends without overshoot
-// Validity: an inverter-fed spindle whose torque allows alpha at every speed. Not modelled: field weakening,
-// load torque, run-out. The drive turns even when its speed word asks for more than max_speed: it
-// clamps, and says so.
+//                omega = kOrientGain * distance, so that the approach ends smoothly
+//
+// Valid for an inverter-fed spindle whose torque allows alpha [rad/s^2] at every speed [rad/s]. Not
+// modelled: field weakening, load torque, run-out. A speed beyond max_speed is clamped, and the
+// result says so. Source: time-optimal braking curve with a linear end zone.
 #pragma once
 
 #include "model/machine.hpp"
@@ -19,11 +20,11 @@ enum class SpindleMode { off, clockwise, counter_clockwise, orient };
 
 /// What one cycle of the spindle brought about.
 struct SpindleCycle {
-  double angle = 0;        ///< at the end of the cycle, in [0, 2 pi) [rad]
-  double speed = 0;        ///< at the end of the cycle; clockwise (M3) is positive [rad/s]
-  bool at_speed = true;    ///< the commanded speed is reached (off: standing; orient: oriented)
-  bool oriented = false;   ///< orient: standing at the target angle
-  bool limited = false;    ///< the commanded speed exceeds max_speed
+  double angle = 0;       ///< at the end of the cycle, in [0, 2 pi) [rad]
+  double speed = 0;       ///< at the end of the cycle; clockwise (M3) is positive [rad/s]
+  bool at_speed = true;   ///< the commanded speed is reached (off: standing; orient: oriented)
+  bool oriented = false;  ///< orient: standing at the target angle
+  bool limited = false;   ///< the commanded speed exceeds max_speed
 };
 
 class SpindleDrive {

@@ -35,8 +35,8 @@ void check(int degree, const std::vector<double>& knots, const std::vector<Vec3>
   if (!(knots[points.size()] > knots[order - 1])) fail("the knots leave no span for the curve");
 }
 
-// k-th derivative at u inside the knot span [knots[span], knots[span + 1]]: differences of the control
-// points give the derivative's own control points, de Boor's recursion evaluates them.
+// k-th derivative at u inside the knot span [knots[span], knots[span + 1]]: differences of the
+// control points give the derivative's own control points, de Boor's recursion evaluates them.
 Vec3 derivative(int degree, const std::vector<double>& knots, const std::vector<Vec3>& points,
                 std::size_t span, double u, int k) {
   const auto p = static_cast<std::size_t>(degree), order = static_cast<std::size_t>(k);
@@ -62,7 +62,8 @@ Vec3 derivative(int degree, const std::vector<double>& knots, const std::vector<
 
 }  // namespace
 
-BSplineCurve::BSplineCurve(int degree, std::vector<double> knots, std::vector<Vec3> points)
+BSplineCurve::BSplineCurve(int degree, const std::vector<double>& knots,
+                           const std::vector<Vec3>& points)
     : degree_(degree), spans_per_u_(0) {
   check(degree, knots, points);
   const auto p = static_cast<std::size_t>(degree);

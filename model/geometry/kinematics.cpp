@@ -30,8 +30,7 @@ AxisVector Kinematics::inverse(const Vec3& p_WT, double a, double c) const {
   const KinematicsParams& k = params_;
   Vec3 p_M;
   if (k.type == KinematicsParams::Type::trunnion) {
-    p_M = k.p_MA +
-          rot_x(-iso.a) * (rot_z(-iso.c) * (p_WT + p_MW_ - k.p_MC) + (k.p_MC - k.p_MA));
+    p_M = k.p_MA + rot_x(-iso.a) * (rot_z(-iso.c) * (p_WT + p_MW_ - k.p_MC) + (k.p_MC - k.p_MA));
   } else {
     p_M = p_WT + p_MW_ - rot_z(iso.c) * (k.p_CA + rot_x(iso.a) * p_AT_) + k.p_CA + p_AT_;
   }

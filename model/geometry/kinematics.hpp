@@ -1,18 +1,20 @@
 // Five-axis kinematics with axes A and C: trunnion (A carries the C table) and head (C carries A).
 //
-// Frames: M machine, W workpiece, T tool. W is parallel to M at A = C = 0 and stands on the table at the
-// work offset p_MW; T has its origin at the controlled point (tool end or ball centre) and its z axis
-// along the tool, away from the workpiece. Signs follow ISO 841 (+ = the tool turns + relative to the
-// workpiece), so that for both types
+// Frames: M machine, W workpiece, T tool. W is parallel to M at A = C = 0 and stands on the table
+// at the work offset p_MW; T has its origin at the controlled point (tool end or ball centre) and
+// its z axis along the tool, away from the workpiece. Signs follow ISO 841 (+ = the tool turns +
+// relative to the workpiece), so that for both types
 //
 //   R_WT = Rz(C) Rx(A),   tool axis in W:  d = R_WT e_z = (sinA sinC, -sinA cosC, cosA)
 //
 //   trunnion  p_M = p_MA + Rx(-A) [ Rz(-C) (p_W + p_MW - p_MC) + (p_MC - p_MA) ]
 //   head      p_M = p_W + p_MW - Rz(C) [ p_CA + Rx(A) (p_AG - L e_z) ] + p_CA + p_AG - L e_z
 //
-// and the linear axes stand at p_M + L e_z, where L is the tool length (so they read the position of
-// the spindle gauge line at A = C = 0). p_MA, p_MC, p_CA, p_AG: see KinematicsParams.
-// Inverse of the tool axis: A = acos d_z, C = atan2(d_x, -d_y); the second solution is (-A, C + 180 deg).
+// and the linear axes stand at p_M + L e_z, where L is the tool length (so they read the position
+// of the spindle gauge line at A = C = 0). p_MA, p_MC, p_CA, p_AG: see KinematicsParams.
+// Inverse of the tool axis: A = acos d_z, C = atan2(d_x, -d_y); the second solution is
+// (-A, C + 180 deg).
+// Source: ISO 841; closed forms by hand, rigid axes without errors.
 #pragma once
 
 #include "model/axes.hpp"
@@ -37,8 +39,8 @@ class Kinematics {
   /// `tool_length` L [m]; `p_MW` work offset [m], machine frame at A = C = 0.
   Kinematics(const KinematicsParams& params, double tool_length, const Vec3& p_MW);
 
-  /// Axis positions that put the controlled point at p_WT with the rotary axes at a, c [rad], as the
-  /// control counts them.
+  /// Axis positions that put the controlled point at p_WT with the rotary axes at a, c [rad], as
+  /// the control counts them.
   AxisVector inverse(const Vec3& p_WT, double a, double c) const;
 
   /// Where the controlled point is, and how the tool stands, for axis positions q.
@@ -64,8 +66,8 @@ class Kinematics {
 Vec3 tool_axis(double a, double c);
 
 /// Rotary positions for a unit tool axis d, continuous with `previous` (least |dA| + |dC| over both
-/// solutions and all turns of C). At the pole (sin A < 1e-4) C keeps its previous value and A is the
-/// best for it, so the tool axis may be off by at most 1e-4 rad there.
+/// solutions and all turns of C). At the pole (sin A < 1e-4) C keeps its previous value and A is
+/// the best for it, so the tool axis may be off by at most 1e-4 rad there.
 RotaryPair rotary_from_axis(const Vec3& d, const RotaryPair& previous);
 
 }  // namespace vcnc

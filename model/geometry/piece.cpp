@@ -21,8 +21,8 @@ Vec3 unit_direction(const PieceParams& params) {
   return params.direction.normalized();
 }
 
-// Ball-centre circle about `centre` in the plane of e1, e2. `slope` and `lift` give the normal and the
-// tool axis as radial and axial share; the axis of the circle is e1 x e2.
+// Ball-centre circle about `axis` through `centre`. Normal and tool axis come as radial (x) and
+// axial (z) share.
 std::vector<Station> circle(const Vec3& centre, const Vec3& axis, double radius, double step,
                             const Vec3& radial_axial_n, const Vec3& radial_axial_tool) {
   check_positive(step, "step");
@@ -70,8 +70,8 @@ class Ring final : public Piece {
 
   SurfacePoint nearest(const Vec3& p, const SurfacePoint&) const override {
     const Meridian m = meridian(p, params_.centre, axis_);
-    const double side = params_.bore ? -1 : 1;             // outward is along side * radial
-    const double out = side * (m.rho - params_.radius);    // beyond the wall
+    const double side = params_.bore ? -1 : 1;                 // outward is along side * radial
+    const double out = side * (m.rho - params_.radius);        // beyond the wall
     const double over = std::abs(m.h) - 0.5 * params_.height;  // beyond the ends
     const Vec3 wall = side * m.radial, end = m.h < 0 ? Vec3(-axis_) : axis_;
     SurfacePoint result;
@@ -96,7 +96,8 @@ class Ring final : public Piece {
   std::vector<Station> scan_path(double ball_radius, double interference, double z,
                                  double step) const override {
     const Vec3 at = axis_point(params_.centre, axis_, z);
-    if ((at - params_.centre).norm() > 0.5 * params_.height) fail("z: beyond the height of the ring");
+    if ((at - params_.centre).norm() > 0.5 * params_.height)
+      fail("z: beyond the height of the ring");
     const double side = params_.bore ? -1 : 1;
     const double radius = params_.radius + side * (ball_radius - interference);
     if (!(radius > 0)) fail("ball_radius: the ball does not fit into the ring");
@@ -187,7 +188,9 @@ class Plane final : public Piece {
 class Cone final : public Piece {
  public:
   explicit Cone(const PieceParams& params)
-      : params_(params), axis_(unit_direction(params)), cos_(std::cos(params.half_angle)),
+      : params_(params),
+        axis_(unit_direction(params)),
+        cos_(std::cos(params.half_angle)),
         sin_(std::sin(params.half_angle)) {
     check_positive(params.radius, "radius_mm");
     check_positive(params.height, "height_mm");
@@ -202,7 +205,8 @@ class Cone final : public Piece {
     const double slant = params_.height / cos_;
     SurfacePoint result;
     result.valid = true;
-    // Inside the frustum the nearest of three flat faces counts, outside the nearest of three segments.
+    // Inside the frustum the nearest of three flat faces counts, outside the nearest of three
+    // segments.
     const double side = (m.rho - params_.radius) * cos_ + m.h * sin_;
     const double over = m.h - params_.height, under = -m.h;
     const Vec3 side_n = cos_ * m.radial + sin_ * axis_;
@@ -215,20 +219,19 @@ class Cone final : public Piece {
     struct Candidate {
       double rho, h;
     };
-    const double along =
-        std::clamp((params_.radius - m.rho) * sin_ + m.h * cos_, 0.0, slant);
-    const Candidate candidates[] = {
-        {params_.radius - along * sin_, along * cos_},
-        {std::min(m.rho, top), params_.height},
-        {std::min(m.rho, params_.radius), 0}};
+    const double along = std::clamp((params_.radius - m.rho) * sin_ + m.h * cos_, 0.0, slant);
+    const Candidate candidates[] = {{params_.radius - along * sin_, along * cos_},
+                                    {std::min(m.rho, top), params_.height},
+                                    {std::min(m.rho, params_.radius), 0}};
     const auto distance = [&](const Candidate& c) { return std::hypot(m.rho - c.rho, m.h - c.h); };
     const Candidate* best = &candidates[0];
     for (const Candidate& c : candidates)
       if (distance(c) < distance(*best)) best = &c;
     result.distance = distance(*best);
-    result.n = result.distance > 1e-12
-                   ? Vec3(((m.rho - best->rho) * m.radial + (m.h - best->h) * axis_) / result.distance)
-                   : side_n;
+    result.n =
+        result.distance > 1e-12
+            ? Vec3(((m.rho - best->rho) * m.radial + (m.h - best->h) * axis_) / result.distance)
+            : side_n;
     result.foot = p - result.distance * result.n;
     return result;
   }
@@ -254,11 +257,16 @@ class Cone final : public Piece {
 
 std::unique_ptr<Piece> make_piece(const PieceParams& params) {
   switch (params.kind) {
-    case PieceParams::Kind::ruled: return std::make_unique<RuledPiece>(params);
-    case PieceParams::Kind::ring: return std::make_unique<Ring>(params);
-    case PieceParams::Kind::sphere: return std::make_unique<Sphere>(params);
-    case PieceParams::Kind::plane: return std::make_unique<Plane>(params);
-    case PieceParams::Kind::cone: return std::make_unique<Cone>(params);
+    case PieceParams::Kind::ruled:
+      return std::make_unique<RuledPiece>(params);
+    case PieceParams::Kind::ring:
+      return std::make_unique<Ring>(params);
+    case PieceParams::Kind::sphere:
+      return std::make_unique<Sphere>(params);
+    case PieceParams::Kind::plane:
+      return std::make_unique<Plane>(params);
+    case PieceParams::Kind::cone:
+      return std::make_unique<Cone>(params);
   }
   fail("kind: unknown kind of piece");
 }

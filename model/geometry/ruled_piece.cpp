@@ -55,8 +55,9 @@ RuledPiece::RuledPiece(const PieceParams& params)
     const RuledSurface::Point point = surface_.eval(u, 0.5);
     const double length2 = point.s_v.squaredNorm();
     if (!(length2 > 1e-12) || !(point.s_u.cross(point.s_v).norm() > 1e-12))
-      throw std::invalid_argument("bottom_mm, top_mm: the surface between the curves degenerates at u = " +
-                                  std::to_string(u));
+      throw std::invalid_argument(
+          "bottom_mm, top_mm: the surface between the curves degenerates at u = " +
+          std::to_string(u));
     samples_.push_back({u, point.s - 0.5 * point.s_v, point.s_v, 1 / length2});
     middle.push_back(point.s);
   }
@@ -91,7 +92,8 @@ RuledPiece::Foot RuledPiece::refine(const Vec3& p, double u, double v) const {
       du = (-g_u * vv + g_v * h_uv) / determinant;
       dv = (-g_v * h_uu + g_u * h_uv) / determinant;
     }
-    const double span = 0.1 * (u_max - u_min);  // far from the foot the quadratic model means little
+    const double span =
+        0.1 * (u_max - u_min);  // far from the foot the quadratic model means little
     du = std::clamp(std::clamp(du, -span, span), u_min - foot.u, u_max - foot.u);
     dv = std::clamp(dv, -foot.v, 1 - foot.v);
     foot.u += du;
@@ -118,8 +120,8 @@ RuledPiece::Foot RuledPiece::search(const Vec3& p) const {
   double v = 0, v_next = 0;
   double before = std::numeric_limits<double>::infinity(), here = at(0, v);
   for (std::size_t i = 0; i < samples_.size(); ++i) {
-    const double next = i + 1 < samples_.size() ? at(i + 1, v_next)
-                                                : std::numeric_limits<double>::infinity();
+    const double next =
+        i + 1 < samples_.size() ? at(i + 1, v_next) : std::numeric_limits<double>::infinity();
     if (here <= before && here <= next) {
       const Foot foot = refine(p, samples_[i].u, v);
       if (foot.converged && (!best.converged || foot.r.squaredNorm() < best.r.squaredNorm()))

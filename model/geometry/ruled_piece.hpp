@@ -1,20 +1,22 @@
 // The rim of equal thickness about a ruled surface: the S-shaped test piece.
 //
-// Nearest point. With r = S(u,v) - p the foot solves r . S_u = 0 and r . S_v = 0 on the bounded patch
-// (a parameter at its bound stays there while the gradient pushes outward). Newton's method with the full
-// Hessian, from the hint when the point is near; otherwise from samples of u, where the best v on the
-// straight ruling is a closed form, so that every local minimum gets its own start.
-// The surface normal is unit(p - M): that of the faces, and of the round ends, foot and crown alike.
-// Points of the mid-surface itself have no nearest face; there n is the face normal of the hint's side.
+// Nearest point. With r = S(u,v) - p the foot solves r . S_u = 0 and r . S_v = 0 on the bounded
+// patch (a parameter at its bound stays there while the gradient pushes outward). Newton's method
+// with the full Hessian, from the hint when the point is near; otherwise from samples of u, where
+// the best v on the straight ruling is a closed form, so that every local minimum gets its own
+// start. The surface normal is unit(p - M): that of the faces, and of the round ends, foot and
+// crown alike. Points of the mid-surface itself have no nearest face; there n is the face normal of
+// the hint's side.
 //
-// Scan path. Face +: u rising, M + rho n with rho = t/2 + r - interference; end at u_max; face -: u falling,
-// M - rho n; end at u_min; v by Newton so that the ball centre's z stays exactly at the given height. On the
-// ends the centre is M(u_end, v(phi)) + rho e(phi), where e turns from n to -n in the plane normal to the end
-// ruling and v(phi) = (z - rho e_z - C0_z) / (C1_z - C0_z) holds z: every station keeps the distance rho from
-// the end ruling, and the path is closed and continuous; its tangent jumps slightly at the ends' seams, where
-// v starts to move. With the face + to the right of rising u, the material is always to the left of travel,
-// so tilt > 0 (the wall leans away from the ball) is an open angle and tilt < 0 a closed one. On the faces
-// the direction of travel for the tilt is that of the foot curve C0, on the ends that of the ball centre.
+// Scan path. Face +: u rising, M + rho n with rho = t/2 + r - interference; end at u_max; face -: u
+// falling, M - rho n; end at u_min; v by Newton so that the ball centre's z stays exactly at the
+// given height. On the ends the centre is M(u_end, v(phi)) + rho e(phi), where e turns from n to -n
+// in the plane normal to the end ruling and v(phi) = (z - rho e_z - C0_z) / (C1_z - C0_z) holds z:
+// every station keeps the distance rho from the end ruling, and the path is closed and continuous;
+// its tangent jumps slightly at the ends' seams, where v starts to move. With the face + to the
+// right of rising u, the material is always to the left of travel, so tilt > 0 (the wall leans away
+// from the ball) is an open angle and tilt < 0 a closed one. On the faces the direction of travel
+// for the tilt is that of the foot curve C0, on the ends that of the ball centre.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// RuledPiece::scan_path: around the rim at constant height. Equations: model/geometry/ruled_piece.hpp.
+// RuledPiece::scan_path: around the rim at constant height. Equations: ruled_piece.hpp.
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -69,8 +69,12 @@ class End {
  public:
   End(const RuledSurface& surface, double u, const Vec3& from, const Vec3& to, double outward,
       double rho, double z)
-      : c0_(surface.eval(u, 0).s), ruling_(surface.eval(u, 0).s_v), d_(ruling_.normalized()),
-        from_(from), rho_(rho), z_(z) {
+      : c0_(surface.eval(u, 0).s),
+        ruling_(surface.eval(u, 0).s_v),
+        d_(ruling_.normalized()),
+        from_(from),
+        rho_(rho),
+        z_(z) {
     Vec3 across = d_.cross(from);
     if (across.dot(outward * surface.eval(u, 0.5).s_u) < 0) across = -across;
     across_ = across;
@@ -93,7 +97,8 @@ class End {
 
 // Appends the stations of one stretch, evenly spaced in arc length, without its first point.
 template <class At>
-void append(std::vector<Station>& path, At at, double from, double to, std::size_t fine, double step) {
+void append(std::vector<Station>& path, At at, double from, double to, std::size_t fine,
+            double step) {
   std::vector<double> parameter(fine + 1), length(fine + 1, 0.0);
   Vec3 previous = path.back().centre;
   for (std::size_t i = 0; i <= fine; ++i) {
@@ -109,7 +114,8 @@ void append(std::vector<Station>& path, At at, double from, double to, std::size
     const double s = length.back() * (static_cast<double>(i) / static_cast<double>(count));
     while (j < fine && length[j] < s) ++j;
     const double share = (s - length[j - 1]) / (length[j] - length[j - 1]);
-    Station station = at(i == count ? to : parameter[j - 1] + share * (parameter[j] - parameter[j - 1]));
+    Station station =
+        at(i == count ? to : parameter[j - 1] + share * (parameter[j] - parameter[j - 1]));
     station.s = start + s;
     path.push_back(station);
   }
@@ -129,12 +135,16 @@ std::vector<Station> RuledPiece::scan_path(double ball_radius, double interferen
   const std::size_t fine = kFineStepsPerSpan * surface_.span_count();
   Face plus(surface_, 1, rho, z), minus(surface_, -1, rho, z);
   std::vector<Station> path{plus.at(first)};
-  append(path, [&](double u) { return plus.at(u); }, first, last, fine, step);
+  append(
+      path, [&](double u) { return plus.at(u); }, first, last, fine, step);
   const End end_last(surface_, last, path.back().n, minus.at(last).n, 1, rho, z);
-  append(path, [&](double phi) { return end_last.at(phi); }, 0, 1, kFineStepsOfEnd, step);
-  append(path, [&](double u) { return minus.at(u); }, last, first, fine, step);
+  append(
+      path, [&](double phi) { return end_last.at(phi); }, 0, 1, kFineStepsOfEnd, step);
+  append(
+      path, [&](double u) { return minus.at(u); }, last, first, fine, step);
   const End end_first(surface_, first, path.back().n, path.front().n, -1, rho, z);
-  append(path, [&](double phi) { return end_first.at(phi); }, 0, 1, kFineStepsOfEnd, step);
+  append(
+      path, [&](double phi) { return end_first.at(phi); }, 0, 1, kFineStepsOfEnd, step);
   return path;
 }
 

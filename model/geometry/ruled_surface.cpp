@@ -8,7 +8,8 @@ namespace vcnc {
 RuledSurface::RuledSurface(BSplineCurve bottom, BSplineCurve top)
     : bottom_(std::move(bottom)), top_(std::move(top)) {
   if (bottom_.u_min() != top_.u_min() || bottom_.u_max() != top_.u_max())
-    throw std::invalid_argument("the two curves of a ruled surface must share their parameter range");
+    throw std::invalid_argument(
+        "the two curves of a ruled surface must share their parameter range");
 }
 
 RuledSurface::Point RuledSurface::eval(double u, double v) const {

@@ -6,8 +6,8 @@
 namespace vcnc {
 namespace {
 
-constexpr double kStep = 100e-6;       // [s]
-constexpr double kGravity = 9.80665;   // [m/s^2]
+constexpr double kStep = 100e-6;      // [s]
+constexpr double kGravity = 9.80665;  // [m/s^2]
 
 }  // namespace
 
@@ -30,7 +30,8 @@ UsableRange usable_range(const ProbeParams& probe) {
   return range;
 }
 
-ProbeContact::ProbeContact(const ProbeParams& probe, const ProbeEffects& effects, const Piece* piece)
+ProbeContact::ProbeContact(const ProbeParams& probe, const ProbeEffects& effects,
+                           const Piece* piece)
     : probe_(probe),
       effects_(effects),
       piece_(piece),

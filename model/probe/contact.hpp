@@ -1,42 +1,48 @@
 // The scanning probe as a mechanism: a ball on a spring-guided mass that touches a workpiece.
 //
-// The ball centre is at p = p_WT + R_WT delta in the workpiece frame, delta the deflection in the probe
-// frame (parallel to the tool frame), p_WT the tool pose. State: p and its velocity v. With m = moving mass
-// + stylus, k the spring rate and d = 2 zeta sqrt(k m):
+// The ball centre is at p = p_WT + R_WT delta in the workpiece frame, delta the deflection in the
+// probe frame (parallel to the tool frame), p_WT, R_WT the tool pose. State: p and its velocity v.
+// With m = moving mass + stylus, k the spring rate and d = 2 zeta sqrt(k m):
 //
-//   m v' = -k (p - p_WT) - d (v - v_T) + F_h + lambda,   v_T the velocity of the tool's controlled point
-//   gap  g(p) = distance(p) - ball radius >= 0,  lambda_n >= 0,  lambda_n g = 0   (no rebound)
-//   |lambda_t| <= mu lambda_n, opposite to the sliding velocity                   (Coulomb)
-//   F_h  suspension hysteresis: Coulomb friction of the guides, at most k * return_to_zero
+//   m v' = -k (p - p_WT) - d (v - v_T) + F_h + lambda
+//   v_T       velocity of the tool's controlled point
+//   contact   gap = distance(p) - ball radius >= 0,  lambda_n >= 0,  lambda_n gap = 0, no rebound
+//   friction  |lambda_t| <= mu lambda_n, opposite to the sliding velocity (Coulomb)
+//   F_h       suspension hysteresis: Coulomb friction of the guides, at most k * return_to_zero
 //
-// Integration: Moreau time stepping at h = 100 us, p1 = p0 + h v1 (symplectic Euler: the spring acts from the
-// start of the step, the damper implicitly; stable for every probe within the ranges of ProbeParams).
-// The impulses of guides, contact and surface friction follow in turn on the same step. The unilateral
-// constraint is imposed on the position at the end of the step: the ball is put back along the normal of
-// the nearest point, which is exact for any surface, because the foot does not change along its normal.
-// So in lasting contact the ball rests on the surface to rounding and without friction the deflection
-// is the geometric penetration along the normal. Across the normal it lags by m a / k behind a tool
-// that accelerates with a along the surface: 15 um at 0.3 m/s^2, and decays with the damping.
+// Integration: Moreau time stepping at h = 100 us, p1 = p0 + h v1 (symplectic Euler: the spring
+// acts from the start of the step, the damper implicitly; stable for every probe within the ranges
+// of ProbeParams). The impulses of guides, contact and surface friction follow in turn on the same
+// step. The unilateral constraint is imposed on the position at the end of the step: the ball is
+// put back along the normal of the nearest point, which is exact for any surface, because the foot
+// does not change along its normal. So in lasting contact the ball rests on the surface to
+// rounding, and without friction the deflection is the geometric penetration along the normal.
+// Across the normal it lags by m a / k behind a tool that accelerates with a along the surface:
+// 15 um at 0.3 m/s^2.
 //
-// Rest of the guides: with return_to_zero h the free ball may come to rest anywhere within +-h.
-// Gravity does not deflect the ball (the rest position is the zero of the probe), it takes away range:
-// see usable_range.
+// With return_to_zero h the free ball may come to rest anywhere within +-h. Gravity does not
+// deflect the ball (the rest position is the zero of the probe), it takes away range: see
+// usable_range.
 //
-// Neglected: (1) rotation of the probe frame. The suspension turns with the tool, its guides carry the mass
-// along; what is left are centrifugal m w^2 |delta| and Coriolis 2 m w |delta'| forces on 65 g: at
-// w = 164 deg/s, |delta| = 2 mm, |delta'| = 50 mm/s at most 1.1e-3 N + 18.6e-3 N, against 0.66 N of the spring
-// at 0.5 mm - and Coriolis only during lift-off. (2) bending of the stylus, 57 nm at 0.65 N (carbide,
-// 50 mm x 2 mm), proportional to the deflection and hence part of the calibration. (3) elasticity of the
-// contact (Hertz: below 0.5 um at 0.65 N). (4) a suspension that is not equally stiff in all directions.
-// Source: the SP600 class of scanning probes (moving mass 55 g, 135 gf/mm); Moreau, Unilateral Contact
-// and Dry Friction in Finite Freedom Dynamics, 1988.
+// Neglected:
+// - Rotation of the probe frame. The suspension turns with the tool, its guides carry the mass
+//   along; what is left are the centrifugal force m w^2 |delta| and the Coriolis force
+//   2 m w |delta'| on m = 65 g. At w = 164 deg/s, |delta| = 2 mm, |delta'| = 50 mm/s they are at
+//   most 1.1 mN + 18.6 mN against 662 mN of the spring at 0.5 mm, the second only in lift-off.
+// - Bending of the stylus: 57 nm at 0.65 N (carbide, 50 mm x 2 mm), proportional to the deflection
+//   and hence part of the calibration.
+// - Elasticity of the contact (Hertz, below 0.5 um at 0.65 N), and a suspension that is not equally
+//   stiff in all directions.
+// - End stops: the deflection goes on beyond the range and beyond overtravel as driven.
+// Source: scanning probes of the SP600 class (moving mass 55 g, 135 gf/mm); Moreau, Unilateral
+// Contact and Dry Friction in Finite Freedom Dynamics, 1988.
 //
 // Usage in the probe node, once per bus cycle with the true load positions of the five drives:
 //
-//   for (int j = 0; j < 10; ++j) {                            // every 100 us
+//   for (int j = 0; j < 10; ++j) {                              // every 100 us
 //     for (axis) q[axis] = truth[axis].position[j];
-//     const Vec3 delta = contact.step(kinematics.forward(q)); // true deflection, probe frame
-//     for (c = 0..2) estimate[c] = channel[c].sample(delta[c]);  // model/probe/signals.hpp
+//     const Vec3 delta = contact.step(kinematics.forward(q));   // true deflection, probe frame
+//     for (c = 0..2) sample[c] = channel[c].sample(delta[c]);   // model/probe/signals.hpp
 //   }
 #pragma once
 
@@ -56,10 +62,10 @@ struct UsableRange {
 };
 
 /// The range left when gravity has moved the suspension by dz = weight / spring rate:
-///   vertical    along z: the stylus pulls down, dz = m_stylus g / k (the suspension itself is trimmed)
+///   vertical    along z: the stylus pulls down, dz = m_stylus g / k (the rest is trimmed out)
 ///   horizontal  along y: dz = (m_moving + m_stylus) g / k
-/// The side that gravity pulls to loses dz, the other side gains it. Spring rates of probes are given in
-/// grams per millimetre: 135 gf/mm = 1324 N/m, so dz [mm] = m [g] / 135.
+/// The side that gravity pulls to loses dz, the other side gains it. Spring rates of probes are
+/// given in grams per millimetre: 135 gf/mm = 1324 N/m, so dz [mm] = m [g] / 135.
 UsableRange usable_range(const ProbeParams& probe);
 
 class ProbeContact {
@@ -67,9 +73,9 @@ class ProbeContact {
   /// `piece` may be null (nothing to touch) and must outlive the contact.
   ProbeContact(const ProbeParams& probe, const ProbeEffects& effects, const Piece* piece);
 
-  /// Advances by one step of 100 us to the instant in which the tool has this pose; returns the true
-  /// deflection in the probe frame [m]. The first call places the ball: at rest, at its zero or
-  /// on the surface when the zero is inside the material.
+  /// Advances by one step of 100 us to the instant in which the tool has this pose; returns the
+  /// true deflection in the probe frame [m]. The first call places the ball: at rest, at its zero
+  /// or on the surface when the zero is inside the material.
   Vec3 step(const ToolPose& pose);
 
   bool touching() const { return touching_; }

@@ -48,7 +48,8 @@ LissajousFit LissajousSums::fit() const {
     result.verdict = why;
     return result;
   };
-  if (*std::min_element(sector_.begin(), sector_.end()) == 0) return refuse(FitVerdict::no_coverage);
+  if (*std::min_element(sector_.begin(), sector_.end()) == 0)
+    return refuse(FitVerdict::no_coverage);
 
   const Eigen::Matrix<double, 5, 1> x = normal_.ldlt().solve(right_);
   const double A = x[0], B = x[1], C = x[2], D = x[3], E = x[4];
@@ -65,7 +66,8 @@ LissajousFit LissajousSums::fit() const {
   if (!(e.amplitude >= kLeastAmplitude && e.amplitude <= kMostAmplitude))
     return refuse(FitVerdict::amplitude);
 
-  // Sum of (algebraic residual)^2 from the sums; a radial distance dr changes the form by 2 level dr / R1.
+  // Sum of (algebraic residual)^2 from the sums; a radial distance dr changes the form by 2 level
+  // dr / R1.
   const double sum = x.dot(normal_ * x) - 2 * x.dot(right_) + count_;
   result.residual = std::sqrt(std::max(sum, 0.0) / count_) / (2 * level);
   if (result.residual > kMostResidual) return refuse(FitVerdict::residual);

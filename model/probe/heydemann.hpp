@@ -6,10 +6,11 @@
 //   p = (2BD - EC) / (C^2 - 4AB),  q = (2AE - DC) / (C^2 - 4AB)
 //   R1 = sqrt(4B (1 + A p^2 + B q^2 + C p q) / (4AB - C^2))
 //   u' = u - p,   w' = ((u - p) sin alpha + k (w - q)) / cos alpha,   phi = atan2(w', u')
-// Uncorrected, phi is off by (q cos phi - p sin phi)/R1 + ((R2-R1)/R1) sin(2 phi)/2 - alpha cos^2 phi.
-// Valid for errors that stay constant over the samples, |alpha| < 90 deg, a radial noise of a few per
-// cent; a fit is refused when 4AB <= C^2, R1 is outside 0.3..0.6 V, the rms radial residual exceeds 2 % of R1, or
-// a sector of 30 deg holds no sample. Source: Heydemann, Applied Optics 20 (1981) 3382.
+// Uncorrected, phi is off by (q cos phi - p sin phi)/R1 + ((R2-R1)/R1) sin(2 phi)/2 - alpha cos^2
+// phi. Valid for errors that stay constant over the samples, |alpha| < 90 deg, a radial noise of a
+// few per cent; a fit is refused when 4AB <= C^2, R1 is outside 0.3..0.6 V, the rms radial residual
+// exceeds 2 % of R1, or a sector of 30 deg holds no sample. Source: Heydemann, Applied Optics 20
+// (1981) 3382.
 #pragma once
 
 #include <Eigen/Core>
@@ -41,8 +42,8 @@ enum class FitVerdict { good, too_few, no_coverage, no_ellipse, amplitude, resid
 
 struct LissajousFit {
   FitVerdict verdict = FitVerdict::too_few;
-  Lissajous ellipse;        ///< counts when the verdict is good
-  double residual = 0;      ///< rms radial distance over R1
+  Lissajous ellipse;    ///< counts when the verdict is good
+  double residual = 0;  ///< rms radial distance over R1
 };
 
 /// Sums of a fit, built up sample by sample without memory of the samples.
@@ -64,9 +65,9 @@ class LissajousSums {
 /// Fit over a batch of at least 50 samples.
 LissajousFit fit_lissajous(std::span<const SinCos> samples);
 
-/// Passes signals through until enough of the ellipse has been seen, then corrects them. It takes the same
-/// number of samples from every sector, so that a probe at rest does not outweigh one that moves. A
-/// fit that is refused starts the collection anew.
+/// Passes signals through until enough of the ellipse has been seen, then corrects them. It takes
+/// the same number of samples from every sector, so that a probe at rest does not outweigh one that
+/// moves. A fit that is refused starts the collection anew.
 class OnlineCorrector {
  public:
   /// The samples corrected by what is known so far.

@@ -1,18 +1,20 @@
-// From a deflection to converter codes and back: one channel of the probe and its acquisition module.
+// From a deflection to converter codes and back: one channel of the probe and its acquisition.
 //
-//   phase     phi = 2 pi x / signal period
-//   signals   u = R1 cos phi + p,  w = R2 sin(phi - alpha) + q,  R1 = 0.5 V (1 Vpp), errors per channel
-//   front end V = 1.65 V + 2.5 u
-//   ADC       code = round((V + noise) / q) clamped to 0 .. 2^N - 1,  q = 3.3 V / 2^N, N = 12 or 16; both
-//             signals at the same instant, which jitters: x is taken at x + x' dt_jitter
-//   phase     phi^ = atan2(w', u'), with or without the correction of model/probe/heydemann.hpp
-//   unwrap    sum of the steps d = wrap(phi^_k - phi^_k-1); x^ = sum * period / 2 pi
-// The count is free of slips while |x'| < period / (2 * 100 us), 100 mm/s at 20 um; half of that is the
-// design limit. A slip is flagged and stays flagged, never repaired: |d| > 0.8 pi, a step that
-// differs from the last one by more than pi / 2, a signal amplitude outside 0.6 .. 1.4 of R1, or a free
-// probe that does not read zero (check_zero). Errors of 12-bit conversion: 1 / 1551 rad, 2.05 nm at 20 um.
-// Source: 1 Vpp interface; converter data of STM32F4/H7 class parts. Not modelled: anti-alias filter,
-// integral non-linearity, crosstalk between channels.
+//   phase      phi = 2 pi x / signal period
+//   signals    u = R1 cos phi + p,  w = R2 sin(phi - alpha) + q,  R1 = 0.5 V (1 Vpp)
+//   front end  V = 1.65 V + 2.5 u
+//   ADC        code = round((V + noise) / q) clamped to 0 .. 2^N - 1,  q = 3.3 V / 2^N, N = 12 or
+//              16; both signals at one instant, which jitters: x is taken at x + x' dt_jitter
+//   phase      phi^ = atan2(w', u'), with or without the correction of model/probe/heydemann.hpp
+//   unwrap     sum of the steps d = wrap(phi^_k - phi^_k-1);  x^ = sum * period / 2 pi
+//
+// The count is free of slips while |x'| < period / (2 * 100 us), 100 mm/s at 20 um; half of that is
+// the design limit. A slip is flagged and stays flagged, never repaired: |d| > 0.8 pi, a step that
+// differs from the last one by more than pi / 2, a signal amplitude outside 0.6 .. 1.4 of R1, or a
+// free probe that does not read zero (check_zero).
+// Resolution: one code is 1 / 1551 rad or 2.05 nm of 20 um with 12 bits, 0.13 nm with 16 bits.
+// Not modelled: anti-alias filter, integral non-linearity, crosstalk between channels.
+// Source: 1 Vpp interface of scales and probes; converter data of STM32F4/H7 class parts.
 #pragma once
 
 #include <cstdint>
@@ -27,8 +29,8 @@ struct Adc {
   int bits = 16;
   static constexpr double kReference = 3.3, kMiddle = 1.65, kGain = 2.5;
 
-  double lsb() const;                         ///< [V] at the converter
-  std::uint16_t code(double signal) const;    ///< signal [V] before the front end
+  double lsb() const;                       ///< [V] at the converter
+  std::uint16_t code(double signal) const;  ///< signal [V] before the front end
   double signal(std::uint16_t code) const;
   bool clipped(std::uint16_t code) const;
 };
@@ -69,13 +71,16 @@ class SignalChannel {
   /// otherwise.
   int check_zero();
   /// Takes the probe to be free now and starts counting from there; clears the slip.
-  void set_zero() { unwrapper_.reset(); check_slip_ = false; }
+  void set_zero() {
+    unwrapper_.reset();
+    check_slip_ = false;
+  }
 
  private:
   double period_;
   Adc adc_;
   ProbeParams::Correction correction_;
-  Lissajous truth_;          ///< what the sensor really draws
+  Lissajous truth_;  ///< what the sensor really draws
   double noise_, jitter_;
   std::uint64_t seed_, stream_, counter_ = 0;
   double last_deflection_ = 0;

@@ -30,10 +30,12 @@ inline std::uint64_t mix(std::uint64_t state, const Frame& frame) {
   return state;
 }
 
+inline std::string toy_name(int id) { return std::string("toy ").append(std::to_string(id)); }
+
 /// Answers with a digest of all frames it has accepted so far; now and then with an EMCY as well.
 class ToyNode : public Node {
  public:
-  explicit ToyNode(int id) : id_(id), name_("toy " + std::to_string(id)) {}
+  explicit ToyNode(int id) : id_(id), name_(toy_name(id)) {}
 
   int id() const override { return id_; }
   std::string_view name() const override { return name_; }
@@ -46,10 +48,6 @@ class ToyNode : public Node {
     ticks.push_back(k);
     state_ = mix(state_, static_cast<std::uint64_t>(k));
     for (const Frame& frame : inputs) state_ = mix(state_, frame);
-    if (silent_from >= 0 && k >= silent_from) {
-      // Something is said, but not the cyclic frame: a node that hangs while its bus part lives.
-      return;
-    }
     Frame answer;
     answer.id = static_cast<std::uint16_t>(kStatusBase + id_);
     answer.len = 16;
@@ -62,7 +60,6 @@ class ToyNode : public Node {
   }
 
   std::function<void(Tick)> before_step;
-  Tick silent_from = -1;
   std::vector<Tick> ticks;
 
  private:
@@ -99,7 +96,7 @@ class ToyMaster : public Master {
 
 inline Roster roster(int nodes) {
   Roster all;
-  for (int id = 1; id <= nodes; ++id) all.push_back({id, "toy " + std::to_string(id)});
+  for (int id = 1; id <= nodes; ++id) all.push_back({id, toy_name(id)});
   return all;
 }
 

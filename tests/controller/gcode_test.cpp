@@ -61,8 +61,9 @@ TEST(Gcode, EveryWorkOffsetIsKnown) {
   Machine machine = test_machine();
   for (int i = 0; i < 6; ++i) {
     machine.setup.work_offset[static_cast<std::size_t>(i)] = Vec3(0.01 * i, 0, 0);
-    expect_near(only_move(std::string("G").append(std::to_string(54 + i)).append(" G0 X1"), machine).end,
-                coordinates(1 + 10 * i, 200, 300, 0, 0));
+    expect_near(
+        only_move(std::string("G").append(std::to_string(54 + i)).append(" G0 X1"), machine).end,
+        coordinates(1 + 10 * i, 200, 300, 0, 0));
   }
 }
 
@@ -151,13 +152,11 @@ TEST(Gcode, ArcByCentreAndByRadiusAgree) {
     const double turn = g == "G3" ? 1 : -1;
     const Move centre = last_move(begin + " X10 Y" + (turn > 0 ? "10" : "-10") + " I0 J" +
                                   (turn > 0 ? "10" : "-10") + " F100");
-    const Move radius =
-        last_move(begin + " X10 Y" + (turn > 0 ? "10" : "-10") + " R10 F100");
+    const Move radius = last_move(begin + " X10 Y" + (turn > 0 ? "10" : "-10") + " R10 F100");
     EXPECT_NEAR(centre.arc.sweep, turn * kPi / 2, 1e-12);
     EXPECT_NEAR(radius.arc.sweep, turn * kPi / 2, 1e-9);
     EXPECT_LE((centre.arc.centre - radius.arc.centre).norm(), 1e-12);
-    const Move longer =
-        last_move(begin + " X10 Y" + (turn > 0 ? "10" : "-10") + " R-10 F100");
+    const Move longer = last_move(begin + " X10 Y" + (turn > 0 ? "10" : "-10") + " R-10 F100");
     EXPECT_NEAR(longer.arc.sweep, turn * 1.5 * kPi, 1e-9);
   }
 }
@@ -187,8 +186,7 @@ TEST(Gcode, RadiusMismatchWithinTheToleranceIsASpiral) {
 TEST(Gcode, DwellStopsAndSpindle) {
   Machine machine = test_machine();
   machine.probe.in_spindle = false;
-  const auto blocks =
-      read_blocks("S600 M3\nG4 P1.5\nM4\nM5\nM19\nM0\nM1\nm2\nG999\n", machine);
+  const auto blocks = read_blocks("S600 M3\nG4 P1.5\nM4\nM5\nM19\nM0\nM1\nm2\nG999\n", machine);
   ASSERT_EQ(blocks.size(), 7u);
   using Mode = SpindleWord::Mode;
   EXPECT_EQ(std::get<SpindleWord>(blocks[0]).mode, Mode::clockwise);
@@ -211,11 +209,18 @@ TEST(Gcode, EveryAcceptedCodeIsAccepted) {
   Machine machine = test_machine();
   machine.probe.in_spindle = false;
   for (const char* code :
-       {"G0 X1", "G1 X1 F1", "G2 I1 F1", "G3 I1 F1", "G4 P1", "G17", "G18", "G19", "G20", "G21",
-        "G28 X0", "G40", "G43 H1", "G43.4 H1", "G49", "G53 G0 X1", "G54", "G55", "G56", "G57",
-        "G58", "G59", "G61", "G64", "G64 P0.01", "G90", "G91", "G93", "G94", "F100", "S100", "M0",
-        "M1", "M2", "S1 M3", "S1 M4", "M5", "M19", "M30", "N10", "O1234", "%", "%1234",
-        "N10 G17 G21 G90 G94 G40 G49 G54 G64", "(comment)", "; comment", "g1 x 1 f 20"})
+       {"G0 X1",     "G1 X1 F1",  "G2 I1 F1",   "G3 I1 F1",
+        "G4 P1",     "G17",       "G18",        "G19",
+        "G20",       "G21",       "G28 X0",     "G40",
+        "G43 H1",    "G43.4 H1",  "G49",        "G53 G0 X1",
+        "G54",       "G55",       "G56",        "G57",
+        "G58",       "G59",       "G61",        "G64",
+        "G64 P0.01", "G90",       "G91",        "G93",
+        "G94",       "F100",      "S100",       "M0",
+        "M1",        "M2",        "S1 M3",      "S1 M4",
+        "M5",        "M19",       "M30",        "N10",
+        "O1234",     "%",         "%1234",      "N10 G17 G21 G90 G94 G40 G49 G54 G64",
+        "(comment)", "; comment", "g1 x 1 f 20"})
     EXPECT_NO_THROW(read_blocks(std::string(code) + "\nM30\n", machine)) << code;
 }
 
@@ -344,7 +349,8 @@ const WrongProgram kWrong[] = {
     {"", 0, "the program is empty"},
     {"G0 X1\n", 1, "does not end with M2 or M30"},
     {"G0 X1\nG1 Y1 F100\n\n", 3, "does not end with M2 or M30"},
-    {"%\nO1\nG0 X1\n;\nX2000\nM30", 5, "X would reach 2010.000 mm; allowed is -1000.000 to 1000.000"},
+    {"%\nO1\nG0 X1\n;\nX2000\nM30", 5,
+     "X would reach 2010.000 mm; allowed is -1000.000 to 1000.000"},
     {"G0 A-400\nM30", 1, "A would reach -400.000 deg"},
     {"G0 X990 Y0\nG3 X990 Y0 J100 F100\nM30", 2, "X would reach"},
     // Both ends are within the travel, the middle of the turn is not.

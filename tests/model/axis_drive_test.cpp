@@ -134,8 +134,8 @@ TEST(AxisDrive, GainMismatchMakesAnEllipseThatTurnsWithTheDirection) {
   EXPECT_NEAR(circle(axis(50), axis(48), 0.15, 2000).peak_to_peak, 27.78 * kUm, 0.02 * 27.78 * kUm);
 }
 
-// Out and back smoothly (slower than friction alone brakes the load), with a pause on each end; load
-// positions where both pass the middle, and the error of the load at rest on each end.
+// Out and back smoothly (slower than friction alone brakes the load), with a pause on each end;
+// load positions where both pass the middle, and the error of the load at rest on each end.
 struct Reversal {
   double lost_motion = 0, error_out = 0, error_home = 0;
 };
@@ -186,8 +186,8 @@ TEST(AxisDrive, NullEffectsLoseNothing) {
   EXPECT_NEAR(reversal(axis(40, 1, 1), {}).lost_motion, 0, 1e-3 * kUm);
 }
 
-// Free resonance sqrt(K (1/m + 1/m_r)) / 2 pi = 95 Hz of the twist after a step, with the velocity loop
-// opened as far as the parameters allow.
+// Free resonance sqrt(K (1/m + 1/m_r)) / 2 pi = 95 Hz of the twist after a step, with the velocity
+// loop opened as far as the parameters allow.
 TEST(AxisDrive, FreeResonanceOfTwoMasses) {
   AxisParams params = axis(0.1);
   params.servo.velocity_bandwidth = 1;

@@ -32,7 +32,7 @@ std::vector<Example> examples() {
   const std::vector<Vec3> eight{{5, 0, 0},   {-10, 20, 0}, {10, 20, 0}, {20, 30, 0},
                                 {30, 30, 1}, {40, 30, 4},  {50, 20, 0}, {55, 0, 0}};
   return {{3, {0, 0, 0, 0, .2, .4, .6, .8, 1, 1, 1, 1}, eight},
-          {2, {0, 0, 0, .1, .15, .5, .5, .8, 1, 1, 1}, eight},      // uneven, one double knot
+          {2, {0, 0, 0, .1, .15, .5, .5, .8, 1, 1, 1}, eight},  // uneven, one double knot
           {1, {0, 0, .1, .2, .5, .6, .7, .9, 1, 1}, eight},
           {5, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13}, eight},  // not clamped
           {7, {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1}, eight}};
@@ -61,7 +61,8 @@ TEST(BSpline, DerivativesMatchDifferences) {
       const auto low = curve.eval(u - h), mid = curve.eval(u), high = curve.eval(u + h);
       ASSERT_LT((mid.c1 - (high.c - low.c) / (2 * h)).norm(), 1e-5 / range) << e.degree;
       if (e.degree > 1)
-        ASSERT_LT((mid.c2 - (high.c1 - low.c1) / (2 * h)).norm(), 1e-3 / (range * range)) << e.degree;
+        ASSERT_LT((mid.c2 - (high.c1 - low.c1) / (2 * h)).norm(), 1e-3 / (range * range))
+            << e.degree;
       else
         ASSERT_EQ(mid.c2, Vec3::Zero());
     }
@@ -101,9 +102,9 @@ TEST(BSpline, ReproducesAPolynomial) {
   }
 }
 
-std::string reason(int degree, std::vector<double> knots, std::size_t points) {
+std::string reason(int degree, const std::vector<double>& knots, std::size_t points) {
   try {
-    BSplineCurve(degree, std::move(knots), std::vector<Vec3>(points, Vec3::Zero()));
+    BSplineCurve(degree, knots, std::vector<Vec3>(points, Vec3::Zero()));
   } catch (const std::invalid_argument& error) {
     return error.what();
   }

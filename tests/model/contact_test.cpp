@@ -36,7 +36,8 @@ TEST(UsableRange, FormulaAndTable) {
     double stylus_g;
     double z_plus, z_minus, y_plus, y_minus;
   };
-  const Row rows[] = {{4.6, 1.8, 1.6, 1.2, 2.0}, {20, 2.0, 1.4, 1.0, 2.2}, {50, 2.2, 1.2, 0.8, 2.4}};
+  const Row rows[] = {
+      {4.6, 1.8, 1.6, 1.2, 2.0}, {20, 2.0, 1.4, 1.0, 2.2}, {50, 2.2, 1.2, 0.8, 2.4}};
   for (const Row& row : rows) {
     ProbeParams probe;
     probe.spring_rate = 1323.9;  // 135 gf/mm
@@ -124,7 +125,10 @@ TEST(ProbeContact, DeflectionIsThePenetrationOnAPlane) {
 
 TEST(ProbeContact, DeflectionIsThePenetrationInARing) {
   const auto piece = make_piece(ring());
-  ProbeContact contact({}, {}, piece.get());
+  const ProbeParams params;
+  ProbeContact contact(params, {}, piece.get());
+  const double damping = 2 * params.damping_ratio *
+                         std::sqrt(params.spring_rate * (params.moving_mass + params.stylus_mass));
   const double radius = 0.1, w = 0.05 / radius;
   for (int i = 0; i < 40000; ++i) {
     const double phi = w * kStep * i;
@@ -132,9 +136,10 @@ TEST(ProbeContact, DeflectionIsThePenetrationInARing) {
     const Vec3 delta = contact.step(at(radius * radial));
     ASSERT_NEAR(contact.ball().norm(), 0.0995, 1e-12);  // rests on the surface
     if (i > 20000) {
-      ASSERT_NEAR(-delta.dot(contact.surface().n), 0, 0.51e-3);
       ASSERT_NEAR(delta.dot(contact.surface().n), 0.5e-3, 1e-9);
-      ASSERT_LT((delta + 0.5e-3 * radial).norm(), 1e-6);
+      // The ball is on the smaller circle and slower than the tool: the damper draws it ahead.
+      const double ahead = damping * 0.05 * (0.5e-3 / radius) / params.spring_rate;
+      ASSERT_NEAR(delta.dot(Vec3::UnitZ().cross(radial)), ahead, 0.05 * ahead);
     }
   }
 }
@@ -245,7 +250,8 @@ TEST(ProbeContact, SuspensionReturnsToZeroWithinItsHysteresis) {
   effects.return_to_zero = 2e-6;
   ProbeContact contact({}, effects, piece.get());
   for (int i = 0; i < 2000; ++i) contact.step(at({2.5e-3, 0, 0}));
-  EXPECT_NEAR(contact.step(at({2.5e-3, 0, 0})).x(), 0.5e-3, 1e-12);  // the surface decides in contact
+  EXPECT_NEAR(contact.step(at({2.5e-3, 0, 0})).x(), 0.5e-3,
+              1e-12);  // the surface decides in contact
   double x = 2.5e-3;
   Vec3 delta;
   for (int i = 0; i < 20000; ++i) {

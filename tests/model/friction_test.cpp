@@ -40,14 +40,16 @@ double force_at(const FrictionParams& params, double v) {
 
 TEST(Friction, StribeckLawAtConstantSpeed) {
   for (const double v : {1e-4, 1e-3, 2e-3, 5e-3, 0.05, -0.05, -1e-3}) {
-    const double expected = std::copysign(250 + 100 * std::exp(-(v / 2e-3) * (v / 2e-3)), v) + 1000 * v;
+    const double expected =
+        std::copysign(250 + 100 * std::exp(-(v / 2e-3) * (v / 2e-3)), v) + 1000 * v;
     EXPECT_NEAR(force_at(stribeck(), v), expected, 1e-6) << v;
   }
 }
 
 TEST(Friction, LuGreLawAtConstantSpeed) {
   for (const double v : {1e-4, 1e-3, 2e-3, 5e-3, 0.05, -0.05}) {
-    const double expected = std::copysign(250 + 100 * std::exp(-(v / 2e-3) * (v / 2e-3)), v) + 1000 * v;
+    const double expected =
+        std::copysign(250 + 100 * std::exp(-(v / 2e-3) * (v / 2e-3)), v) + 1000 * v;
     EXPECT_NEAR(force_at(lugre(), v), expected, 1e-5) << v;
   }
 }
@@ -136,7 +138,8 @@ TEST(Friction, NeverAddsKineticEnergyNorReverses) {
   }
 }
 
-// Over a closed cycle of motion the LuGre model takes energy; it only lends what its bristles store.
+// Over a closed cycle of motion the LuGre model takes energy; it only lends what its bristles
+// store.
 TEST(Friction, LuGreDissipatesOverCycles) {
   for (const double amplitude : {2e-6, 20e-6, 2e-3}) {
     Friction friction(lugre());

@@ -18,11 +18,12 @@ double phase_error(const SinCos& s, double phi) {
 
 Lissajous skewed() { return {0.5, 0.5 / 0.46, 0.013, -0.021, 4 * kDegree}; }
 
-std::vector<SinCos> samples(const Lissajous& truth, int count, double from, double to, double noise) {
+std::vector<SinCos> samples(const Lissajous& truth, int count, double from, double to, double noise,
+                            std::uint64_t seed = 3) {
   std::vector<SinCos> result;
   for (int i = 0; i < count; ++i) {
     SinCos s = truth.signals(from + (to - from) * i / count);
-    const auto g = gaussian_noise(3, 1, static_cast<std::uint64_t>(i));
+    const auto g = gaussian_noise(seed, 1, static_cast<std::uint64_t>(i));
     s.u += noise * g[0];
     s.w += noise * g[1];
     result.push_back(s);
@@ -83,17 +84,24 @@ TEST(Heydemann, RecoversAnEllipseExactly) {
   EXPECT_LT(fit.residual, 1e-7);
 }
 
-// 1 mV of noise: below 0.5 mrad, 1.6 nm at 20 um, after correction.
+// 1 mV of noise: typically 0.4 mrad are left, 1.3 nm at 20 um.
 TEST(Heydemann, RecoversThroughNoise) {
-  const auto fit = fit_lissajous(samples(skewed(), 500, 0, 6 * kPi, 1e-3));
-  ASSERT_EQ(fit.verdict, FitVerdict::good);
-  EXPECT_LT(worst_corrected(skewed(), fit.ellipse), 0.5e-3);
-  EXPECT_NEAR(fit.residual, 1e-3 / 0.48, 0.3e-3);  // radial noise over the radius
+  std::vector<double> left;
+  for (std::uint64_t seed = 0; seed < 101; ++seed) {
+    const auto fit = fit_lissajous(samples(skewed(), 500, 0, 6 * kPi, 1e-3, seed));
+    ASSERT_EQ(fit.verdict, FitVerdict::good);
+    left.push_back(worst_corrected(skewed(), fit.ellipse));
+    ASSERT_LT(left.back(), 1.5e-3);
+    ASSERT_NEAR(fit.residual, 1e-3 / 0.48, 0.3e-3);  // radial noise over the radius
+  }
+  std::sort(left.begin(), left.end());
+  EXPECT_NEAR(left[50], 0.4e-3, 0.1e-3);
 }
 
 TEST(Heydemann, RefusesWhatItCannotTrust) {
   EXPECT_EQ(fit_lissajous(samples(skewed(), 49, 0, 2 * kPi, 0)).verdict, FitVerdict::too_few);
-  EXPECT_EQ(fit_lissajous(samples(skewed(), 100, 0, 1.7 * kPi, 0)).verdict, FitVerdict::no_coverage);
+  EXPECT_EQ(fit_lissajous(samples(skewed(), 100, 0, 1.5 * kPi, 0)).verdict,
+            FitVerdict::no_coverage);
   EXPECT_EQ(fit_lissajous(samples(skewed(), 300, 0, 2 * kPi, 0.05)).verdict, FitVerdict::residual);
   Lissajous weak = skewed();
   weak.amplitude = 0.25;

@@ -39,10 +39,11 @@ std::vector<Golden> golden_vectors() {
   trunnion.p_MA = trunnion.p_MC = Vec3(0, 0, -50) * kMm;
   offset_trunnion.p_MA = Vec3(0, 0, -50) * kMm;
   offset_trunnion.p_MC = Vec3(0, 25, -80) * kMm;
-  return {{"head, pivot 200 mm", head, 0.150, Vec3::Zero(), {44.202014, -39.239627, 17.938524}},
-          {"head with offsets", offset_head, 0.150, Vec3::Zero(), {44.352783, -39.500765, 19.648625}},
-          {"trunnion", trunnion, 0.150, Vec3::Zero(), {18.660254, 38.939102, 20.961548}},
-          {"trunnion with offset", offset_trunnion, 0, Vec3::Zero(), {6.160254, 42.086475, 19.815997}}};
+  return {
+      {"head, pivot 200 mm", head, 0.150, Vec3::Zero(), {44.202014, -39.239627, 17.938524}},
+      {"head with offsets", offset_head, 0.150, Vec3::Zero(), {44.352783, -39.500765, 19.648625}},
+      {"trunnion", trunnion, 0.150, Vec3::Zero(), {18.660254, 38.939102, 20.961548}},
+      {"trunnion with offset", offset_trunnion, 0, Vec3::Zero(), {6.160254, 42.086475, 19.815997}}};
 }
 
 TEST(Kinematics, ToolAxisAtA20C30) {

@@ -59,7 +59,8 @@ TEST(Piece, DistanceIsADistance) {
 
 TEST(Piece, SideOfTheMaterial) {
   PieceParams p = piece_of(Kind::ring);
-  EXPECT_NEAR(make_piece(p)->nearest(p.centre, {}).distance, p.radius, 1e-15);  // free inside a bore
+  EXPECT_NEAR(make_piece(p)->nearest(p.centre, {}).distance, p.radius,
+              1e-15);  // free inside a bore
   p.bore = false;
   EXPECT_LT(make_piece(p)->nearest(p.centre, {}).distance, 0);
   p = piece_of(Kind::sphere);
@@ -119,7 +120,8 @@ TEST(Piece, UprightPlaneIsScannedAtItsHeight) {
 
 TEST(Piece, ConeToolFollowsTheFlank) {
   const PieceParams params = piece_of(Kind::cone);
-  for (const Station& s : make_piece(params)->scan_path(3e-3, 0.5e-3, params.centre.z() + .02, 1e-3)) {
+  for (const Station& s :
+       make_piece(params)->scan_path(3e-3, 0.5e-3, params.centre.z() + .02, 1e-3)) {
     EXPECT_NEAR(s.tool_axis.dot(s.n), 0, 1e-15);
     EXPECT_NEAR(s.tool_axis.dot(params.direction), std::cos(15 * kDegree), 1e-15);
   }
@@ -136,8 +138,10 @@ TEST(Piece, RefusesImpossiblePieces) {
   p = piece_of(Kind::sphere);
   p.radius = -1;
   refuses(p);
-  EXPECT_THROW(make_piece(piece_of(Kind::sphere))->scan_path(3e-3, 0, 1, 1e-3), std::invalid_argument);
-  EXPECT_THROW(make_piece(piece_of(Kind::ring))->scan_path(3e-3, 0, 1, 1e-3), std::invalid_argument);
+  EXPECT_THROW(make_piece(piece_of(Kind::sphere))->scan_path(3e-3, 0, 1, 1e-3),
+               std::invalid_argument);
+  EXPECT_THROW(make_piece(piece_of(Kind::ring))->scan_path(3e-3, 0, 1, 1e-3),
+               std::invalid_argument);
 }
 
 }  // namespace

@@ -43,7 +43,8 @@ TEST(Adc, CodesOfKnownVoltages) {
     EXPECT_LE(std::abs(sixteen.signal(sixteen.code(v)) - v), 0.5 * sixteen.lsb() / 2.5 * 1.0001);
 }
 
-// Half a step on both signals moves the phase by at most sqrt(2)/2 step over the amplitude in steps.
+// Half a step on both signals moves the phase by at most sqrt(2)/2 step over the amplitude in
+// steps.
 TEST(SignalChannel, ResolutionOfTheConverters) {
   const double sixteen = sweep_error(SignalChannel(probe(16), {}, 0, 1));
   const double twelve = sweep_error(SignalChannel(probe(12), {}, 0, 1));
@@ -122,11 +123,11 @@ TEST(SignalChannel, ChannelsHaveNoiseOfTheirOwnButOneClock) {
 }
 
 // Runs at constant speed after a gentle start; true and estimated way.
-struct Run {
+struct Way {
   double true_way, way;
   bool slip;
 };
-Run run(double speed) {
+Way travel(double speed) {
   SignalChannel channel(probe(), {}, 0, 1);
   double x = 0, v = 0;
   ChannelSample s;
@@ -139,13 +140,13 @@ Run run(double speed) {
 }
 
 TEST(SignalChannel, CountsUpToTheLimitAndFlagsASlipBeyond) {
-  const Run design = run(0.05);  // p f / 4
+  const Way design = travel(0.05);  // p f / 4
   EXPECT_NEAR(design.way, design.true_way, 1 * kNm);
   EXPECT_FALSE(design.slip);
-  const Run warned = run(0.09);  // still right, but too near to the limit to believe
+  const Way warned = travel(0.09);  // still right, but too near to the limit to believe
   EXPECT_NEAR(warned.way, warned.true_way, 1 * kNm);
   EXPECT_TRUE(warned.slip);
-  const Run beyond = run(0.12);  // beyond p f / 2 = 100 mm/s: counts backwards
+  const Way beyond = travel(0.12);  // beyond p f / 2 = 100 mm/s: counts backwards
   EXPECT_GT(std::abs(beyond.way - beyond.true_way), 1e-3);
   EXPECT_TRUE(beyond.slip);
   const double periods = (beyond.way - beyond.true_way) / kPeriod;

@@ -1,0 +1,81 @@
+// What a program asks for, as typed blocks: moves, dwells, spindle words, stops, the end.
+#pragma once
+
+#include <optional>
+#include <variant>
+
+#include "model/geometry/kinematics.hpp"
+#include "model/machine.hpp"
+
+namespace vcnc {
+
+/// Coordinates a program speaks: (X, Y, Z, A, C), either the controlled point with the rotary axes
+/// (RTCP) or five axis positions [m, rad].
+using Coordinates = Eigen::Matrix<double, 5, 1>;
+
+/// What the coordinates of a move mean.
+struct MotionFrame {
+  bool rtcp = false;         ///< false: axis positions; the rest has no meaning then
+  Vec3 p_MW = Vec3::Zero();  ///< work offset [m]
+  double tool_length = 0;    ///< [m]
+  friend bool operator==(const MotionFrame&, const MotionFrame&) = default;
+};
+
+/// Converts between the coordinates of a frame and axis positions.
+class FrameMap {
+ public:
+  FrameMap(const KinematicsParams& params, const MotionFrame& frame);
+  Coordinates to_axes(const Coordinates& x) const;
+  Coordinates from_axes(const Coordinates& q) const;
+
+ private:
+  std::optional<Kinematics> kinematics_;
+};
+
+/// Circle (or spiral, within the radius tolerance) about an axis parallel to X, Y or Z.
+struct Arc {
+  Vec3 centre = Vec3::Zero();  ///< its component along the normal has no meaning
+  std::size_t normal = kZ;     ///< index of the plane's normal
+  double sweep = 0;            ///< [rad], positive counter-clockwise seen from +normal
+};
+
+struct Move {
+  enum class Kind { rapid, line, arc };
+  enum class Feed { none, tip, rotary, time };  ///< none: rapid; rotary: only A, C move
+  Kind kind = Kind::line;
+  Coordinates start = Coordinates::Zero(), end = Coordinates::Zero();
+  MotionFrame frame;
+  Arc arc;
+  Feed feed_mode = Feed::none;
+  double feed = 0;       ///< tip [m/s], rotary [rad/s], time [s] for the whole move
+  bool exact = false;    ///< G61
+  double tolerance = 0;  ///< G64: of the controlled point [m]
+  bool alone = false;    ///< begins and ends at rest (G28, G53)
+  int line = 0;
+};
+
+struct Dwell {
+  double seconds = 0;
+  int line = 0;
+};
+
+struct SpindleWord {
+  enum class Mode { off, clockwise, counter_clockwise, orient };
+  Mode mode = Mode::off;
+  double speed = 0;  ///< [rad/s]
+  int line = 0;
+};
+
+/// M0 (waits) and M1 (the switch is off: only brings the axes to rest).
+struct ProgramStop {
+  bool optional = false;
+  int line = 0;
+};
+
+struct ProgramEnd {
+  int line = 0;
+};
+
+using Block = std::variant<Move, Dwell, SpindleWord, ProgramStop, ProgramEnd>;
+
+}  // namespace vcnc

@@ -1,0 +1,69 @@
+#include "bus/wire_docs.hpp"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <regex>
+#include <set>
+
+#include "bus/frame.hpp"
+
+namespace vcnc {
+namespace {
+
+TEST(WireDocs, FieldsLieInsideTheirMessageWithoutOverlap) {
+  std::set<std::string_view> names;
+  for (const WireMessage& m : wire_messages()) {
+    EXPECT_TRUE(names.insert(m.name).second) << m.name;
+    EXPECT_TRUE(valid_length(m.length, m.fd)) << m.name;
+    std::vector<std::string_view> owner(static_cast<std::size_t>(m.length));
+    std::set<std::string_view> fields;
+    for (const WireField& f : m.fields) {
+      EXPECT_TRUE(fields.insert(f.name).second) << m.name << "." << f.name;
+      EXPECT_GT(f.per_unit, 0);
+      ASSERT_LE(f.offset + f.bytes, m.length) << m.name << "." << f.name;
+      for (int b = f.offset; b < f.offset + f.bytes; ++b) {
+        EXPECT_EQ(owner[static_cast<std::size_t>(b)], "") << m.name << "." << f.name;
+        owner[static_cast<std::size_t>(b)] = f.name;
+      }
+    }
+  }
+  EXPECT_EQ(names.size(), 9u);
+}
+
+TEST(WireDocs, MarkdownNamesEveryField) {
+  const std::string page = wire_table_markdown();
+  for (const WireMessage& m : wire_messages()) {
+    EXPECT_NE(page.find("## " + std::string(m.name) + " ("), std::string::npos);
+    for (const WireField& f : m.fields)
+      EXPECT_NE(page.find("| " + std::string(f.name) + " |"), std::string::npos) << f.name;
+  }
+  EXPECT_NE(page.find("| 4 | i48 | x_position | 1e-10 | m | -14073.7..14073.7 |"), std::string::npos);
+}
+
+TEST(WireDocs, DbcHasEveryFrameOnceAndMarksFd) {
+  const std::string text = dbc();
+  const std::regex message(R"re(BO_ (\d+) (\w+): (\d+) (\w+)\n)re");
+  std::map<int, int> length_by_id;
+  std::set<std::string> names;
+  for (std::sregex_iterator i(text.begin(), text.end(), message), end; i != end; ++i) {
+    EXPECT_TRUE(length_by_id.emplace(std::stoi((*i)[1]), std::stoi((*i)[3])).second);
+    EXPECT_TRUE(names.insert((*i)[2]).second) << (*i)[2];
+  }
+  EXPECT_EQ(length_by_id.size(), 2u + 8 + 6 + 2 + 1 + 8);
+  EXPECT_EQ(length_by_id.at(0x200), 64);
+  EXPECT_EQ(length_by_id.at(0x187), 32);
+  EXPECT_EQ(length_by_id.at(0x085), 8);
+
+  const std::regex fd("BA_ \"VFrameFormat\" BO_ (\\d+) 14;\nBA_ \"CANFD_BRS\" BO_ \\1 1;");
+  std::set<int> fd_ids;
+  for (std::sregex_iterator i(text.begin(), text.end(), fd), end; i != end; ++i)
+    fd_ids.insert(std::stoi((*i)[1]));
+  EXPECT_EQ(fd_ids, (std::set<int>{0x181, 0x182, 0x183, 0x184, 0x185, 0x186, 0x187, 0x188, 0x200}));
+  for (const char* attribute : {"BusType", "VFrameFormat", "CANFD_BRS"})
+    EXPECT_NE(text.find("BA_DEF_DEF_ \"" + std::string(attribute) + "\""), std::string::npos);
+  EXPECT_NE(text.find("SG_ x_position : 32|48@1- (1e-10,0) "), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vcnc

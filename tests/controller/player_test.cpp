@@ -1,0 +1,283 @@
+#include "controller/player.hpp"
+
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+#include "bus/tick.hpp"
+#include "configs/config.hpp"
+#include "controller/path.hpp"
+#include "tests/controller/program_file.hpp"
+#include "tests/controller/random_program.hpp"
+
+namespace vcnc {
+namespace {
+
+Machine machine_of(const std::string& name) {
+  return load_machine(std::string(VCNC_SOURCE_DIR) + "/configs/machines/" + name + ".toml");
+}
+
+std::vector<PlayerStep> play_file(const std::string& path, const Machine& machine) {
+  Player player(path, machine);
+  std::vector<PlayerStep> steps;
+  do {
+    steps.push_back(player.step());
+  } while (!steps.back().done && steps.size() < 1'000'000);
+  EXPECT_TRUE(steps.back().done);
+  return steps;
+}
+
+std::vector<PlayerStep> play(const std::string& text, const Machine& machine) {
+  const ProgramFile file(text);
+  return play_file(file.path(), machine);
+}
+
+AxisVector start_of(const Machine& machine) {
+  AxisVector q;
+  for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = machine.axes[i].limits.start;
+  return q;
+}
+
+/// Largest shares of the limits in what the axes do, and of the velocity's possible error.
+struct Worst {
+  double velocity = 0, acceleration = 0, jerk = 0, derivative = 0;
+};
+
+Worst worst_of(const std::vector<PlayerStep>& steps, const Machine& machine) {
+  std::vector<AxisVector> q(3, start_of(machine)), dq(3, AxisVector{});
+  for (const PlayerStep& step : steps) {
+    q.push_back(step.position);
+    dq.push_back(step.velocity);
+  }
+  Worst worst;
+  for (std::size_t k = 3; k < q.size(); ++k)
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      const AxisLimits& limits = machine.axes[i].limits;
+      EXPECT_TRUE(std::isfinite(q[k][i]) && std::isfinite(dq[k][i]));
+      const double first = q[k][i] - q[k - 1][i], before = q[k - 1][i] - q[k - 2][i];
+      const double third = first - 2 * before + (q[k - 2][i] - q[k - 3][i]);
+      worst.velocity = std::max({worst.velocity, std::abs(first) / kCycle / limits.velocity,
+                                 std::abs(dq[k][i]) / limits.velocity});
+      worst.acceleration = std::max(
+          worst.acceleration, std::abs(first - before) / (kCycle * kCycle) / limits.acceleration);
+      worst.jerk = std::max(worst.jerk, std::abs(third) / (kCycle * kCycle * kCycle) / limits.jerk);
+      // A central difference differs from the derivative by at most J dt^2 / 6.
+      const double central = (q[k][i] - q[k - 2][i]) / (2 * kCycle);
+      worst.derivative = std::max(
+          worst.derivative, std::abs(central - dq[k - 1][i]) / (limits.jerk * kCycle * kCycle / 6));
+    }
+  return worst;
+}
+
+void expect_motion_is_sound(const std::vector<PlayerStep>& steps, const Machine& machine) {
+  const Worst worst = worst_of(steps, machine);
+  EXPECT_LE(worst.velocity, 1.001);
+  EXPECT_LE(worst.acceleration, 1.001);
+  EXPECT_LE(worst.jerk, 1.001);
+  EXPECT_LE(worst.derivative, 3);  // within a cycle the jerk may be above its mean
+  EXPECT_EQ(steps.back().velocity, AxisVector{});
+}
+
+/// Distance of a point from what a move programmes.
+double distance(const Vec3& p, const Move& move) {
+  const Vec3 a = move.start.head<3>(), d = move.end.head<3>() - a;
+  if (move.kind != Move::Kind::arc) {
+    const double length2 = d.squaredNorm();
+    const double share = length2 > 0 ? std::clamp((p - a).dot(d) / length2, 0.0, 1.0) : 0.0;
+    return (p - a - share * d).norm();
+  }
+  const PathSegment segment = make_segment(move, 0);
+  const auto off = [&](double s) {
+    return (p - Vec3(programmed_point(segment, s).x.head<3>())).norm();
+  };
+  constexpr int kSamples = 24;
+  int best = 0;
+  for (int i = 1; i <= kSamples; ++i)
+    if (off(segment.length * i / kSamples) < off(segment.length * best / kSamples)) best = i;
+  double lo = segment.length * std::max(best - 1, 0) / kSamples;
+  double hi = segment.length * std::min(best + 1, kSamples) / kSamples;
+  for (int i = 0; i < 36; ++i) {
+    const double m1 = lo + (hi - lo) / 3, m2 = hi - (hi - lo) / 3;
+    (off(m1) < off(m2) ? hi : lo) = off(m1) < off(m2) ? m2 : m1;
+  }
+  return off(0.5 * (lo + hi));
+}
+
+TEST(Player, RandomProgramsKeepLimitsAndTolerance) {
+  for (const std::string name : {"trunnion", "head"}) {
+    const Machine machine = machine_of(name);
+    for (unsigned seed = 1; seed <= 120; ++seed) {
+      RandomProgram random(seed);
+      const std::string text = random.text();
+      SCOPED_TRACE(name + " seed " + std::to_string(seed));
+      const ProgramFile file(text);
+      std::vector<Move> moves;
+      std::vector<PlayerStep> steps;
+      try {
+        moves = read_moves(text, machine);
+        steps = play_file(file.path(), machine);
+      } catch (const ProgramError& error) {
+        ADD_FAILURE() << error.what() << "\n" << text;
+        continue;
+      }
+      expect_motion_is_sound(steps, machine);
+
+      const FrameMap map(machine.kinematics, moves.back().frame);
+      const Coordinates end = map.to_axes(moves.back().end);
+      for (std::size_t i = 0; i < kAxisCount; ++i)
+        EXPECT_NEAR(steps.back().position[i], end[static_cast<Eigen::Index>(i)], 1e-12);
+
+      double worst = 0;
+      std::size_t near = 0;
+      for (std::size_t k = 0; k < steps.size(); k += 11) {
+        while (near + 1 < moves.size() && moves[near].line < steps[k].line) ++near;
+        if (moves[near].line != steps[k].line) continue;
+        const Coordinates q = Eigen::Map<const Coordinates>(steps[k].position.data());
+        const Vec3 p = map.from_axes(q).head<3>();
+        double nearest = 1e9;
+        const std::size_t first = near > 3 ? near - 3 : 0;
+        for (std::size_t i = first; i < std::min(near + 4, moves.size()); ++i)
+          nearest = std::min(nearest, distance(p, moves[i]));
+        worst = std::max(worst, nearest / (moves[near].exact ? 0.5e-6 : moves[near].tolerance));
+      }
+      EXPECT_LE(worst, 1.001);
+      if (testing::Test::HasFailure()) FAIL() << text;
+    }
+  }
+}
+
+TEST(Player, SmallGoldenProgram) {
+  // X: 50 mm at 6 m/min with a 0.1 s dwell, then home: end, feed and order of lines.
+  const Machine machine = machine_of("trunnion");
+  const auto steps = play("G54 G90\nG1 X50 F6000\nG4 P0.1\nX0\nM30\n", machine);
+  double fastest = 0;
+  std::vector<int> lines;
+  std::size_t dwell = 0;
+  for (const PlayerStep& step : steps) {
+    fastest = std::max(fastest, step.feed);
+    if (lines.empty() || lines.back() != step.line) lines.push_back(step.line);
+    dwell += step.dwell;
+    if (step.dwell) {
+      EXPECT_EQ(step.position[kX], 0.05);
+      EXPECT_EQ(step.velocity, AxisVector{});
+    }
+    EXPECT_NEAR(step.position[kZ], 0.45, 1e-15);
+  }
+  EXPECT_NEAR(fastest, 0.1, 1e-9);
+  EXPECT_EQ(lines, (std::vector<int>{2, 3, 4, 5}));
+  EXPECT_EQ(dwell, 100u);
+  EXPECT_EQ(steps.back().position[kX], 0);
+  // 2 x (0.5 s at feed + time to change speed) + dwell.
+  const double least = 2 * (0.5 + std::sqrt(0.1 / 50) * 2 - 0.0) - 2 * 0.1 + 0.1;
+  EXPECT_GE(static_cast<double>(steps.size()) * kCycle, least);
+  EXPECT_LE(static_cast<double>(steps.size()) * kCycle, least + 0.35);
+}
+
+TEST(Player, SpindleWordsAreWaitedFor) {
+  Machine machine = machine_of("trunnion");
+  machine.probe.in_spindle = false;
+  const auto steps = play("S6000 M3\nG1 X1 F600\nM5\nM19\nM30\n", machine);
+  const double speed = 6000 * 2 * kPi / 60;
+  std::size_t waiting = 0;
+  for (const PlayerStep& step : steps) {
+    if (!step.dwell) continue;
+    ++waiting;
+    if (step.line == 1) {
+      EXPECT_EQ(step.spindle, PlayerStep::Spindle::clockwise);
+      EXPECT_NEAR(step.spindle_speed, speed, 1e-9);
+    }
+    if (step.line == 4) {
+      EXPECT_EQ(step.spindle, PlayerStep::Spindle::orient);
+    }
+  }
+  EXPECT_NEAR(static_cast<double>(waiting) * kCycle, 2 * speed / machine.spindle.acceleration + 0.2,
+              0.004);
+  EXPECT_EQ(steps.back().spindle, PlayerStep::Spindle::off);
+}
+
+TEST(Player, ProgramStopHoldsAndOptionalStopOnlyEndsTheRun) {
+  const Machine machine = machine_of("trunnion");
+  const auto plain = play("G1 X1 F600\nX2\nM30\n", machine);
+  const auto optional = play("G1 X1 F600\nM1\nX2\nM30\n", machine);
+  const auto stop = play("G1 X1 F600\nM0\nX2\nM30\n", machine);
+  EXPECT_GT(optional.size(), plain.size());
+  EXPECT_EQ(stop.size() - optional.size(), static_cast<std::size_t>(kProgramStopSeconds / kCycle));
+}
+
+TEST(Player, ExactStopRestsInTheCorner) {
+  const Machine machine = machine_of("trunnion");
+  bool rested = false;
+  for (const PlayerStep& step : play("G61\nG1 X20 F3000\nY20\nM30\n", machine))
+    rested = rested || (step.velocity == AxisVector{} && step.position[kX] == 0.02 &&
+                        std::abs(step.position[kY]) < 1e-12);
+  EXPECT_TRUE(rested);
+  for (const PlayerStep& step : play("G64 P0.1\nG1 X20 F3000\nY20\nM30\n", machine)) {
+    const bool in_corner = step.line == 3 && step.position[kY] < 0.005;
+    if (in_corner) {
+      EXPECT_GT(step.feed, 0);
+    }
+  }
+}
+
+TEST(Player, ACircleHasItsExactRadius) {
+  for (const std::string name : {"trunnion", "head"}) {
+    const Machine machine = machine_of(name);
+    for (const std::string g : {"G2", "G3"}) {
+      const auto steps = play(
+          "G0 X0 Y0\nG1 X100 F3000\nG4 P0\n" + g + " I-100 F3000\n" + g + " I-100\nM30\n", machine);
+      double worst = 0, angle = 0;
+      for (std::size_t k = 1; k < steps.size(); ++k) {
+        if (steps[k].line < 4 || steps[k].line > 5) continue;
+        const AxisVector &p = steps[k].position, &q = steps[k - 1].position;
+        worst = std::max(worst, std::abs(std::hypot(p[kX], p[kY]) - 0.1));
+        angle += std::remainder(std::atan2(p[kY], p[kX]) - std::atan2(q[kY], q[kX]), 2 * kPi);
+      }
+      EXPECT_LE(worst, 0.12e-6);
+      EXPECT_NEAR(angle, (g == "G3" ? 4 : -4) * kPi, 1e-6);
+    }
+  }
+}
+
+TEST(Player, TheSameProgramGivesTheSameBits) {
+  const Machine machine = machine_of("head");
+  const std::string text = RandomProgram(7).text();
+  const auto a = play(text, machine), b = play(text, machine);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    EXPECT_EQ(a[k].position, b[k].position);
+    EXPECT_EQ(a[k].velocity, b[k].velocity);
+  }
+}
+
+TEST(Player, MemoryStaysFlatOverManyRuns) {
+  const Machine machine = machine_of("trunnion");
+  std::string text;
+  for (int i = 0; i < 400; ++i) text += "G1 X5 F20000\nY5\nX0\nY0\nG4 P0.001\n";
+  const ProgramFile file(text + "M30\n");
+  Player player(file.path(), machine);
+  std::size_t early = 0, most = 0;
+  for (int k = 0;; ++k) {
+    const PlayerStep step = player.step();
+    if (step.done) break;
+    if (k == 2000) early = mallinfo2().uordblks;
+    if (k > 2000 && k % 500 == 0) most = std::max(most, mallinfo2().uordblks);
+  }
+  EXPECT_LE(most, early + 200'000);
+}
+
+TEST(Player, SaysDoneAgainAndAgain) {
+  const ProgramFile file("G0 X1\nM30\n");
+  const Machine machine = machine_of("trunnion");
+  Player player(file.path(), machine);
+  PlayerStep step;
+  for (int k = 0; k < 5000; ++k) step = player.step();
+  EXPECT_TRUE(step.done);
+  EXPECT_EQ(step.position[kX], 1e-3);
+  EXPECT_EQ(step.velocity, AxisVector{});
+}
+
+}  // namespace
+}  // namespace vcnc
