@@ -66,8 +66,12 @@ std::optional<CircularResult> evaluate_circle(std::span<const CircularPoint> poi
   if (!goes_around(points)) return std::nullopt;
   const auto centre = fit_harmonics<3>(points);
   const auto second = fit_harmonics<5>(points);
-  CircularResult r{.mean = centre(0), .centre_x = centre(1), .centre_y = centre(2),
-                   .cos2 = second(3), .sin2 = second(4), .step = {}};
+  CircularResult r{.mean = centre(0),
+                   .centre_x = centre(1),
+                   .centre_y = centre(2),
+                   .cos2 = second(3),
+                   .sin2 = second(4),
+                   .step = {}};
   bool first = true;
   for (const CircularPoint& p : points) {
     const double d = p.dR - r.centre_x * std::cos(p.phi) - r.centre_y * std::sin(p.phi);

@@ -10,10 +10,14 @@ constexpr double kEnough = 0.5;  ///< share of a bin that must be seen
 
 Coverage::Bin bin_of(Contact contact) {
   switch (contact) {
-    case Contact::ok: return Coverage::Bin::ok;
-    case Contact::no_contact: return Coverage::Bin::no_contact;
-    case Contact::out_of_range: return Coverage::Bin::out_of_range;
-    case Contact::invalid: break;
+    case Contact::ok:
+      return Coverage::Bin::ok;
+    case Contact::no_contact:
+      return Coverage::Bin::no_contact;
+    case Contact::out_of_range:
+      return Coverage::Bin::out_of_range;
+    case Contact::invalid:
+      break;
   }
   return Coverage::Bin::invalid;
 }

@@ -32,8 +32,8 @@ class Coverage {
  private:
   struct Cell {
     double ok_length = 0;
-    Bin worst = Bin::ok;        ///< of the pass going on
-    bool covered = false;       ///< by this or an earlier pass
+    Bin worst = Bin::ok;   ///< of the pass going on
+    bool covered = false;  ///< by this or an earlier pass
     bool touched = false;
     std::uint32_t pass = 0;
   };

@@ -60,7 +60,8 @@ class PathMeans {
 }  // namespace
 
 Envelope::Envelope(double from, double to, std::size_t buckets)
-    : from_(from), width_(std::max(to - from, 1e-12) / static_cast<double>(buckets)),
+    : from_(from),
+      width_(std::max(to - from, 1e-12) / static_cast<double>(buckets)),
       buckets_(buckets) {}
 
 void Envelope::add(double x, double y) {
@@ -88,7 +89,7 @@ std::vector<Envelope::Point> Envelope::points() const {
     }
     empty = 0;
     result.push_back(first);
-    if (b.count > 1) result.push_back(second);
+    if (second.x > first.x) result.push_back(second);
   }
   return result;
 }
@@ -99,7 +100,8 @@ Curves collect_curves(const RecordingReader& recording, const Summary& summary) 
   for (Envelope* e : {&c.e_n, &c.e_plan, &c.e_servo, &c.e_rest})
     *e = Envelope(0, std::max(summary.line_length, summary.last_station), kBuckets);
   const auto rows = static_cast<std::size_t>(summary.rows);
-  const std::size_t lissajous_stride = rows / kLissajousPoints + 1, path_stride = rows / kPathPoints + 1;
+  const std::size_t lissajous_stride = rows / kLissajousPoints + 1,
+                    path_stride = rows / kPathPoints + 1;
   const double duration = seconds(summary.rows + static_cast<std::int64_t>(summary.missing_rows));
   const int bits = evaluation.machine().probe.adc_bits;
   std::optional<PathMeans> means;
@@ -116,10 +118,12 @@ Curves collect_curves(const RecordingReader& recording, const Summary& summary) 
     c.feed.add(t, row.feed);
     if (k % lissajous_stride == 0)
       for (std::size_t i = 0; i < 3; ++i)
-        c.lissajous[i].push_back({normalised(row.adc[2 * i], bits), normalised(row.adc[2 * i + 1], bits)});
+        c.lissajous[i].push_back(
+            {normalised(row.adc[2 * i], bits), normalised(row.adc[2 * i + 1], bits)});
     if (k % path_stride == 0) c.theoretical.push_back(now.error.theoretical);
     ++k;
     if (!now.counts()) return;
+    c.path_feed = std::max(c.path_feed, row.feed);
     c.e_n.add(now.place.s, now.error.e_n);
     c.e_plan.add(now.place.s, now.error.e_plan);
     c.e_servo.add(now.place.s, now.error.e_servo);

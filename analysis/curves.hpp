@@ -47,6 +47,7 @@ struct Curves {
   Envelope e_n, e_plan, e_servo, e_rest;  ///< over the station [m]
   PerAxis<Envelope> following;            ///< over time [s]
   Envelope bus_load, feed;                ///< over time [s]
+  double path_feed = 0;                   ///< largest commanded feed on the path [m/s]
   std::vector<PathPoint> path;            ///< the scan line; empty: none was followed
   std::vector<Vec3> theoretical;          ///< commanded path, thinned, where there is no line
   std::vector<FacePart> faces;

@@ -5,7 +5,7 @@
 namespace vcnc {
 namespace {
 
-constexpr double kReach = 5e-3;      ///< beyond ball radius + reach there is nothing to evaluate [m]
+constexpr double kReach = 5e-3;  ///< beyond ball radius + reach there is nothing to evaluate [m]
 constexpr double kRetryTravel = 2e-3;  ///< travel after which a failed search is tried again [m]
 constexpr double kStandStill = 1e-9;   ///< travel per cycle that has no direction [m]
 
@@ -39,7 +39,8 @@ ErrorSample DynamicError::evaluate(const TelemetryRow& row) {
   ErrorSample sample;
   sample.tick = static_cast<Tick>(row.tick);
   sample.theoretical = cmd.p_WT;
-  sample.actual = cmd.p_WT + act.R_WT * Vec3(row.deflection[0], row.deflection[1], row.deflection[2]);
+  sample.actual =
+      cmd.p_WT + act.R_WT * Vec3(row.deflection[0], row.deflection[1], row.deflection[2]);
   for (std::size_t j = 0; j < kAxisCount; ++j) sample.following[j] = row.q_act[j] - row.q_cmd[j];
 
   if (!first_) {
@@ -96,9 +97,8 @@ void DynamicError::evaluate_contact(const TelemetryRow& row, const ToolPose& cmd
   const auto J = kinematics_.jacobian(row.q_act);
   for (std::size_t j = 0; j < kAxisCount; ++j)
     sample.share[j] = sample.n.dot(J.col(static_cast<Eigen::Index>(j))) * sample.following[j];
-  sample.contact = hint_act_.valid && hint_ball_.valid
-                       ? contact_of(row, depth, min_deflection_)
-                       : Contact::invalid;
+  sample.contact = hint_act_.valid && hint_ball_.valid ? contact_of(row, depth, min_deflection_)
+                                                       : Contact::invalid;
 }
 
 }  // namespace vcnc

@@ -1,7 +1,7 @@
 // The dynamic error of one instant: what the probe says about the machine, and how it splits up.
 //
-// Frames: W workpiece, T tool = probe. FK is the forward kinematics of the declared machine with the
-// declared tool length (gauge line to ball centre) and work offset G54; R = R_WT(q_act).
+// Frames: W workpiece, T tool = probe. FK is the forward kinematics of the declared machine with
+// the declared tool length (gauge line to ball centre) and work offset G54; R = R_WT(q_act).
 //
 //   T_th  = FK(q_cmd)            theoretical path of the ball centre
 //   T_act = T_th + R delta       actual path by the definition of the inspection method
@@ -55,13 +55,13 @@ struct ErrorSample {
   double lag = 0, cross = 0;        ///< tracking error along and across the travel [m]
   double travel = 0;                ///< commanded path since the previous sample [m]
 
-  bool near_piece = false;          ///< everything below holds only then
+  bool near_piece = false;  ///< everything below holds only then
   Contact contact = Contact::no_contact;
   Vec3 n = Vec3::UnitZ();
-  SurfacePoint foot;                ///< nearest surface point of b
-  double distance = 0;              ///< D(FK(q_cmd)) [m]
+  SurfacePoint foot;    ///< nearest surface point of b
+  double distance = 0;  ///< D(FK(q_cmd)) [m]
   double e_n = 0, e_plan = 0, e_servo = 0, e_rest = 0;
-  AxisVector share{};               ///< of each axis in the error along n [m]
+  AxisVector share{};  ///< of each axis in the error along n [m]
 };
 
 /// Live evaluator: one row in, one sample out, no look-ahead.
@@ -83,10 +83,10 @@ class DynamicError {
 
   SurfacePoint hint_cmd_, hint_act_, hint_ball_;
   bool first_ = true;
-  Vec3 previous_ = Vec3::Zero();   ///< previous theoretical position
-  Vec3 tangent_ = Vec3::Zero();    ///< last direction of travel
-  Vec3 probed_ = Vec3::Zero();     ///< where `clearance_` was found
-  double clearance_ = -1;          ///< the piece is at least this far from `probed_`
+  Vec3 previous_ = Vec3::Zero();  ///< previous theoretical position
+  Vec3 tangent_ = Vec3::Zero();   ///< last direction of travel
+  Vec3 probed_ = Vec3::Zero();    ///< where `clearance_` was found
+  double clearance_ = -1;         ///< the piece is at least this far from `probed_`
 };
 
 }  // namespace vcnc

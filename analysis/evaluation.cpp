@@ -220,7 +220,8 @@ void Evaluation::judge(Summary& s) const {
   if (failed_) {
     s.verdict = Verdict::fail;
     s.verdict_reason = fmt::format(
-        "e_n = {:+.1f} um at s = {:.1f} mm exceeds the tolerance of {:.1f} um on at least {} samples "
+        "e_n = {:+.1f} um at s = {:.1f} mm exceeds the tolerance of {:.1f} um on at least {} "
+        "samples "
         "and {:.1f} mm of the path",
         fail_error_ * 1e6, fail_at_ * 1e3, tolerance_um, kFailSamples, kFailArc * 1e3);
   } else if (!piece_) {
@@ -230,33 +231,37 @@ void Evaluation::judge(Summary& s) const {
   } else if (!complete) {
     s.verdict_reason = fmt::format("only {:.1f} % of the path is measured", s.coverage_percent);
   } else if (whole_.e_n.max_abs() > s.tolerance) {
-    s.verdict_reason = fmt::format(
-        "single samples of up to {:.1f} um exceed the tolerance of {:.1f} um", worst_um, tolerance_um);
+    s.verdict_reason =
+        fmt::format("single samples of up to {:.1f} um exceed the tolerance of {:.1f} um", worst_um,
+                    tolerance_um);
   } else {
     s.verdict = Verdict::pass;
-    s.verdict_reason = fmt::format("the whole path is measured and |e_n| <= {:.1f} um stays within {:.1f} um",
-                                   worst_um, tolerance_um);
+    s.verdict_reason =
+        fmt::format("the whole path is measured and |e_n| <= {:.1f} um stays within {:.1f} um",
+                    worst_um, tolerance_um);
   }
 }
 
 void Evaluation::warn(Summary& s) const {
   if (s.interference && std::abs(*s.interference - s.predeflection) > kInterferenceMismatch)
-    s.warnings.push_back(
-        fmt::format("the program drives the ball {:.3f} mm into the piece, but setup.predeflection_mm "
-                    "is {:.3f}: e_n and e_plan contain the difference",
-                    *s.interference * 1e3, s.predeflection * 1e3));
+    s.warnings.push_back(fmt::format(
+        "the program drives the ball {:.3f} mm into the piece, but setup.predeflection_mm "
+        "is {:.3f}: e_n and e_plan contain the difference",
+        *s.interference * 1e3, s.predeflection * 1e3));
   if (missing_ > 0) s.warnings.push_back(fmt::format("{} rows are missing", missing_));
   if (disordered_ > 0)
     s.warnings.push_back(fmt::format("{} rows arrived twice or out of order", disordered_));
   if (s.end.gaps > 0)
-    s.warnings.push_back(fmt::format("{} frames or rows were lost before the analysis", s.end.gaps));
+    s.warnings.push_back(
+        fmt::format("{} frames or rows were lost before the analysis", s.end.gaps));
   if (!s.end.complete)
     s.warnings.push_back(fmt::format("the run did not come to its end: {}", s.end.reason));
   if (off_line_rows_ > 0)
-    s.warnings.push_back(fmt::format(
-        "{} samples lie off the scan line of the piece at the height first scanned; they count in the "
-        "statistics, not in the coverage",
-        off_line_rows_));
+    s.warnings.push_back(
+        fmt::format("{} samples lie off the scan line of the piece at the height first scanned; "
+                    "they count in the "
+                    "statistics, not in the coverage",
+                    off_line_rows_));
   if (piece_ && on_path_rows_ == 0)
     s.warnings.push_back(
         "the program never scans the piece with a constant interference: no dynamic error");

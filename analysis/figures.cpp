@@ -23,14 +23,16 @@ std::string heading(int width, int height) {
       "set border 3 lw 1 lc rgb '#5a6068'\n"
       "set tics nomirror out scale 0.6 textcolor rgb '#333333'\n"
       "set grid back lw 0.6 lc rgb '#e4e7eb'\n"
-      "set key top right horizontal Left reverse samplen 2 width 1 textcolor rgb '#333333' opaque\n",
+      "set key top right horizontal Left reverse samplen 2 width 1 textcolor rgb '#333333' "
+      "opaque\n",
       width, height);
 }
 
 std::string margins(double bottom, double top) {
-  return fmt::format("set lmargin at screen {}\nset rmargin at screen {}\n"
-                     "set bmargin at screen {}\nset tmargin at screen {}\n",
-                     kLeft, kRight, bottom, top);
+  return fmt::format(
+      "set lmargin at screen {}\nset rmargin at screen {}\n"
+      "set bmargin at screen {}\nset tmargin at screen {}\n",
+      kLeft, kRight, bottom, top);
 }
 
 /// A named data block of an envelope.
@@ -47,7 +49,8 @@ std::string block(const char* name, const Envelope& e, double x_scale, double y_
 }
 
 std::string line(const char* name, const char* title, const char* colour, double width = 1.2) {
-  return fmt::format("${} using 1:2 with lines lw {} lc rgb '{}' title '{}'", name, width, colour, title);
+  return fmt::format("${} using 1:2 with lines lw {} lc rgb '{}' title '{}'", name, width, colour,
+                     title);
 }
 
 /// Largest magnitude in an envelope.
@@ -79,23 +82,26 @@ std::string landmarks(const Curves& curves, const Summary& s, bool names) {
     if (part.face == Face::whole) continue;
     const bool cap = part.face == Face::end_cap || part.face == Face::start_cap;
     if (cap)
-      text += fmt::format("set object {} rectangle from first {:.6g},graph 0 to first {:.6g},graph 1 "
-                          "behind fillstyle solid noborder fillcolor rgb '#eef1f5'\n",
-                          id, part.from * 1e3, part.to * 1e3);
+      text += fmt::format(
+          "set object {} rectangle from first {:.6g},graph 0 to first {:.6g},graph 1 "
+          "behind fillstyle solid noborder fillcolor rgb '#eef1f5'\n",
+          id, part.from * 1e3, part.to * 1e3);
     if (names && !cap)
-      text += fmt::format("set label {} '{}' at first {:.6g},graph 1.17 center textcolor rgb '#555b63'\n",
-                          id, kFaceNames[static_cast<std::size_t>(part.face)],
-                          (part.from + part.to) / 2 * 1e3);
+      text += fmt::format(
+          "set label {} '{}' at first {:.6g},graph 1.17 center textcolor rgb '#555b63'\n", id,
+          kFaceNames[static_cast<std::size_t>(part.face)], (part.from + part.to) / 2 * 1e3);
     ++id;
   }
   int number = 1;
   for (const CrossingMark& c : s.crossings) {
-    text += fmt::format("set arrow {} from first {:.6g},graph 0 to first {:.6g},graph 1 nohead back dt (4,4) lw 1 "
-                        "lc rgb '{}'\n",
-                        id, c.s * 1e3, c.s * 1e3, kViolet);
+    text += fmt::format(
+        "set arrow {} from first {:.6g},graph 0 to first {:.6g},graph 1 nohead back dt (4,4) lw 1 "
+        "lc rgb '{}'\n",
+        id, c.s * 1e3, c.s * 1e3, kViolet);
     if (names)
-      text += fmt::format("set label {} '{}' at first {:.6g},graph 1.07 center font ',11' textcolor rgb '{}'\n", id,
-                          number, c.s * 1e3, kViolet);
+      text += fmt::format(
+          "set label {} '{}' at first {:.6g},graph 1.07 center font ',11' textcolor rgb '{}'\n", id,
+          number, c.s * 1e3, kViolet);
     ++number;
     ++id;
   }
@@ -111,7 +117,8 @@ std::string path_figure(const Curves& curves, const Summary& s, double& magnific
   magnification = 1;
   if (curves.path.empty()) {
     text += "$line << EOD\n";
-    for (const Vec3& p : curves.theoretical) text += fmt::format("{:.6g} {:.6g}\n", p.x() * 1e3, p.y() * 1e3);
+    for (const Vec3& p : curves.theoretical)
+      text += fmt::format("{:.6g} {:.6g}\n", p.x() * 1e3, p.y() * 1e3);
     return text + "EOD\nplot " + line("line", "theoretical path of the ball centre", kInk) + "\n";
   }
   // The magnified tolerance must stay clear of the rest of the path.
@@ -138,10 +145,13 @@ std::string path_figure(const Curves& curves, const Summary& s, double& magnific
     over += out ? offset(p, p.e_n) : "\n";
     any_over = any_over || out;
   }
-  text += nominal + "EOD\n" + band + "\n" + inner + "EOD\n" + actual + "EOD\n" + over + "NaN NaN\nEOD\n";
-  text += "plot " + line("band", fmt::format("tolerance ±{:g} µm", s.tolerance * 1e6).c_str(), "#b4bcc8", 1.0) +
-          ", " + line("nominal", "theoretical path", kGrey, 1.0) + ", " +
-          line("actual", fmt::format("actual path, error × {:g}", magnification).c_str(), kInk, 1.8);
+  text += nominal + "EOD\n" + band + "\n" + inner + "EOD\n" + actual + "EOD\n" + over +
+          "NaN NaN\nEOD\n";
+  text +=
+      "plot " +
+      line("band", fmt::format("tolerance ±{:g} µm", s.tolerance * 1e6).c_str(), "#b4bcc8", 1.0) +
+      ", " + line("nominal", "theoretical path", kGrey, 1.0) + ", " +
+      line("actual", fmt::format("actual path, error × {:g}", magnification).c_str(), kInk, 1.8);
   if (any_over) text += ", " + line("over", "out of tolerance", kRed, 2.2);
   return text + "\n";
 }
@@ -150,7 +160,8 @@ std::string error_figure(const Curves& curves, const Summary& s) {
   const double um = 1e6, mm = 1e3, length = std::max(s.line_length, s.last_station) * mm;
   const double worst = reach(curves.e_n) * um, tolerance = s.tolerance * um;
   const bool show_tolerance = worst > 0.2 * tolerance;
-  const double parts = std::max({reach(curves.e_plan), reach(curves.e_servo), reach(curves.e_rest)}) * um;
+  const double parts =
+      std::max({reach(curves.e_plan), reach(curves.e_servo), reach(curves.e_rest)}) * um;
   std::string text = heading(900, 560);
   text += block("en", curves.e_n, mm, um) + block("plan", curves.e_plan, mm, um) +
           block("servo", curves.e_servo, mm, um) + block("rest", curves.e_rest, mm, um);
@@ -160,14 +171,16 @@ std::string error_figure(const Curves& curves, const Summary& s) {
           "set format x ''\nset ylabel 'e_n  [µm]' offset 0.5\nset key top right\n";
   text += "plot " + line("en", "e_n", kInk, 1.4);
   if (show_tolerance)
-    text += fmt::format(", {} with lines dt 2 lw 1.2 lc rgb '{}' title 'tolerance', {} with lines dt 2 lw 1.2 "
-                        "lc rgb '{}' notitle",
-                        tolerance, kRed, -tolerance, kRed);
+    text += fmt::format(
+        ", {} with lines dt 2 lw 1.2 lc rgb '{}' title 'tolerance', {} with lines dt 2 lw 1.2 "
+        "lc rgb '{}' notitle",
+        tolerance, kRed, -tolerance, kRed);
   text += "\n";
   text += margins(0.12, 0.49) + landmarks(curves, s, false) + y_range(parts) +
-          "set format x '%g'\nset xlabel 'station on the path  s  [mm]'\nset ylabel 'parts  [µm]' offset 0.5\n";
-  text += "plot " + line("rest", "e_{rest}", kGreen) + ", " + line("servo", "e_{servo}", kOrange) + ", " +
-          line("plan", "e_{plan}", kGrey) + "\nunset multiplot\n";
+          "set format x '%g'\nset xlabel 'station on the path  s  [mm]'\nset ylabel 'parts  [µm]' "
+          "offset 0.5\n";
+  text += "plot " + line("rest", "e_{rest}", kGreen) + ", " + line("servo", "e_{servo}", kOrange) +
+          ", " + line("plan", "e_{plan}", kGrey) + "\nunset multiplot\n";
   return text;
 }
 
@@ -186,9 +199,10 @@ std::string following_figure(const Curves& curves) {
   }
   text += "set multiplot\nset key top right\n" + margins(0.57, 0.96) + y_range(linear_reach) +
           "set format x ''\nset ylabel 'X, Y, Z  [µm]' offset 0.5\nplot " + linear + "\n";
-  text += margins(0.14, 0.51) + y_range(rotary_reach) +
-          "set format x '%g'\nset xlabel 'time  [s]'\nset ylabel 'A, C  [arcsec]' offset 0.5\nplot " + rotary +
-          "\nunset multiplot\n";
+  text +=
+      margins(0.14, 0.51) + y_range(rotary_reach) +
+      "set format x '%g'\nset xlabel 'time  [s]'\nset ylabel 'A, C  [arcsec]' offset 0.5\nplot " +
+      rotary + "\nunset multiplot\n";
   return text;
 }
 
@@ -200,29 +214,34 @@ std::string lissajous_figure(const Curves& curves) {
                      "set parametric\nset trange [0:2*pi]\nset samples 181\nunset key\n";
   for (std::size_t i = 0; i < 3; ++i) {
     text += fmt::format("${} << EOD\n", names[i]);
-    for (const auto& [cosine, sine] : curves.lissajous[i]) text += fmt::format("{:.4f} {:.4f}\n", cosine, sine);
+    for (const auto& [cosine, sine] : curves.lissajous[i])
+      text += fmt::format("{:.4f} {:.4f}\n", cosine, sine);
     text += "NaN NaN\nEOD\n";
   }
   text += "set multiplot layout 1,3 margins 0.06,0.99,0.20,0.89 spacing 0.06\n";
   for (std::size_t i = 0; i < 3; ++i)
-    text += fmt::format("set title 'channel {}' textcolor rgb '#333333'\n"
-                        "plot 1.2*cos(t),1.2*sin(t) with lines dt 3 lw 1 lc rgb '{}', "
-                        "0.6*cos(t),0.6*sin(t) with lines dt 3 lw 1 lc rgb '{}', "
-                        "${} using 1:2 with points pt 7 ps 0.16 lc rgb '{}'\n",
-                        names[i], kRed, kRed, names[i], kInk);
+    text += fmt::format(
+        "set title 'channel {}' textcolor rgb '#333333'\n"
+        "plot 1.2*cos(t),1.2*sin(t) with lines dt 3 lw 1 lc rgb '{}', "
+        "0.6*cos(t),0.6*sin(t) with lines dt 3 lw 1 lc rgb '{}', "
+        "${} using 1:2 with points pt 7 ps 0.16 lc rgb '{}'\n",
+        names[i], kRed, kRed, names[i], kInk);
   return text + "unset multiplot\n";
 }
 
 std::string load_figure(const Curves& curves) {
-  std::string text = heading(900, 250) + block("load", curves.bus_load, 1, 100) +
+  std::string text = heading(900, 270) + block("load", curves.bus_load, 1, 100) +
                      block("feed", curves.feed, 1, 60e3);
-  text += "set lmargin at screen 0.09\nset rmargin at screen 0.91\nset bmargin at screen 0.2\n"
-          "set tmargin at screen 0.88\nset border 11\n"
-          "set xlabel 'time  [s]'\nset yrange [0:105]\nset ytics 25\nset ylabel 'bus load  [%]'\n"
-          "set y2range [0:*]\nset y2tics\nset y2label 'commanded feed  [mm/min]'\n"
-          "set key outside top right\n";
-  return text + "plot " + line("load", "bus load", kInk) + ", " +
-         line("feed", "feed", kOrange) + " axes x1y2\n";
+  const double feed = curves.path_feed > 0 ? curves.path_feed : reach(curves.feed);
+  text += fmt::format(
+      "set lmargin at screen {}\nset rmargin at screen 0.9\nset bmargin at screen 0.24\n"
+      "set tmargin at screen 0.88\nset border 11\n"
+      "set xlabel 'time  [s]'\nset yrange [0:105]\nset ytics 25\nset ylabel 'bus load  [%]'\n"
+      "set y2range [0:{:.6g}]\nset y2tics out scale 0.6 textcolor rgb '#333333'\n"
+      "set y2label 'feed  [mm/min]' offset -1\nset key at graph 1,graph 1.17 noopaque\n",
+      kLeft, std::max(feed * 60e3 * 1.4, 1.0));
+  return text + "plot " + line("load", "bus load", kInk) + ", " + line("feed", "feed", kOrange) +
+         " axes x1y2\n";
 }
 
 }  // namespace vcnc

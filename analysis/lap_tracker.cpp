@@ -7,9 +7,10 @@
 namespace vcnc {
 namespace {
 
-constexpr double kEntryTravel = 0.5e-3, kEntryBand = 5e-6;   ///< [m]
+constexpr double kEntryTravel = 0.5e-3, kEntryBand = 2e-6;   ///< [m]
 constexpr double kExitBand = 50e-6;                          ///< [m]
 constexpr double kExitSlope = 0.05, kSlopeTravel = 0.25e-3;  ///< drift of D per travel
+constexpr double kPassBand = 3e-6, kPassTravel = 20e-3;      ///< [m]; a later pass is so far behind
 constexpr double kStandStill = 1e-9;                         ///< travel of a cycle at rest [m]
 constexpr double kAdvance = 0.5;   ///< least share of the travel that must advance the station
 constexpr double kOffLine = 1e-3;  ///< a line farther away is not the one followed [m]
@@ -49,6 +50,7 @@ void LapTracker::enter(const ErrorSample& sample) {
     distance_ref_ = sample.distance;
     try {
       line_.emplace(piece_, ball_radius_, interference(), sample.theoretical.z());
+      kept_.resize(line_->stations().size());
     } catch (const std::invalid_argument&) {
       // The piece has no scan path at this height: the program follows some other path.
     }
@@ -70,7 +72,18 @@ bool LapTracker::left(const ErrorSample& sample) {
   return std::abs(slope) > kExitSlope;
 }
 
+bool LapTracker::differs_from_first_pass(std::size_t segment, double distance) {
+  Kept& kept = kept_[segment];
+  if (kept.at >= 0 && total_travel_ - kept.at > kPassTravel)
+    return distance < kept.min - kPassBand || distance > kept.max + kPassBand;
+  kept.min = kept.at < 0 ? distance : std::min(kept.min, distance);
+  kept.max = kept.at < 0 ? distance : std::max(kept.max, distance);
+  kept.at = total_travel_;
+  return false;
+}
+
 LapTracker::Place LapTracker::track(const ErrorSample& sample) {
+  total_travel_ += sample.travel;
   const bool gap = sample.tick != last_tick_ + 1;
   last_tick_ = sample.tick;
   if (!tracking_) {
@@ -94,7 +107,8 @@ LapTracker::Place LapTracker::track(const ErrorSample& sample) {
   }
   const double from = projection_.s;
   projection_ = line_->project(sample.theoretical, projection_);
-  if (projection_.distance > kOffLine) {
+  if (projection_.distance > kOffLine ||
+      differs_from_first_pass(projection_.segment, sample.distance)) {
     tracking_ = false;
     return {};
   }

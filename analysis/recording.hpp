@@ -8,8 +8,9 @@
 //              trace_hash, wall_seconds, bus_load_worst, gaps
 //
 // While it grows, the file is called NAME.partial; it gets its name when it is complete. Rows are
-// collected and written 1000 at a time, each block followed by a flush, so that the file can be read
-// after the writing process was killed, up to the last block. Memory use does not grow with the run.
+// collected and written 1000 at a time, each block followed by a flush, so that the file can be
+// read after the writing process was killed, up to the last block. Memory use does not grow with
+// the run.
 #pragma once
 
 #include <filesystem>

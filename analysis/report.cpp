@@ -16,11 +16,20 @@ std::string escaped(std::string_view text) {
   std::string result;
   for (const char c : text) {
     switch (c) {
-      case '&': result += "&amp;"; break;
-      case '<': result += "&lt;"; break;
-      case '>': result += "&gt;"; break;
-      case '"': result += "&quot;"; break;
-      default: result += c;
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      default:
+        result += c;
     }
   }
   return result;
@@ -66,36 +75,43 @@ std::string typeset(std::string text) {
   replace("e_n", "e<sub>n</sub>");
   replace("e_plan", "e<sub>plan</sub>");
   replace(" um", " µm");
+  replace("&lt;=", "≤");
   return text;
 }
 
 /// Micrometres with two decimals, never "-0.00".
-std::string um(double metres) { return fmt::format("{:.2f}", std::round(metres * 1e8) / 100 + 0.0); }
+std::string um(double metres) {
+  return fmt::format("{:.2f}", std::round(metres * 1e8) / 100 + 0.0);
+}
 
 std::string tile(std::string_view name, const std::string& value, std::string_view note = "") {
-  return fmt::format("<div class=\"tile\"><span>{}</span><b>{}</b> <i>{}</i></div>\n", name, value, note);
+  return fmt::format("<div class=\"tile\"><span>{}</span><b>{}</b> <i>{}</i></div>\n", name, value,
+                     note);
 }
 
 std::string headline(const Summary& s) {
   std::string text = "<h1>Dynamic error</h1>\n<p class=\"lead\">";
   text += fmt::format("{} on {}", escaped(s.program_name), escaped(s.machine_name));
   if (!s.piece_name.empty()) text += fmt::format(", piece {}", escaped(s.piece_name));
-  text += fmt::format("</p>\n<div class=\"verdict {0}\"><b>{0}</b><span>{1}</span></div>\n", to_string(s.verdict),
-                      typeset(escaped(s.verdict_reason)));
+  text += fmt::format("</p>\n<div class=\"verdict {0}\"><b>{0}</b><span>{1}</span></div>\n",
+                      to_string(s.verdict), typeset(escaped(s.verdict_reason)));
   text += "<div class=\"tiles\">\n";
   const ErrorGroup& whole = s.groups.front();
   if (whole.e_n.count > 0) {
     text += tile("largest |e<sub>n</sub>|", fmt::format("{:.2f} µm", whole.e_n.max_abs() * 1e6),
                  fmt::format("tolerance ±{:g} µm", s.tolerance * 1e6));
-    text += tile("e<sub>n</sub> peak to peak", fmt::format("{:.2f} µm", whole.e_n.peak_to_peak() * 1e6),
-                 fmt::format("rms {:.2f} µm", whole.e_n.rms() * 1e6));
+    text +=
+        tile("e<sub>n</sub> peak to peak", fmt::format("{:.2f} µm", whole.e_n.peak_to_peak() * 1e6),
+             fmt::format("rms {:.2f} µm", whole.e_n.rms() * 1e6));
   }
   if (!s.bins.empty())
     text += tile("coverage", fmt::format("{:.1f} %", s.coverage_percent),
                  fmt::format("of {:.0f} mm", s.line_length * 1e3));
-  text += tile("duration", fmt::format("{:.2f} s", s.simulated_seconds()),
-               s.real_time_factor() > 0 ? fmt::format("{:.1f} × real time", s.real_time_factor()) : "");
-  text += tile("bus load, worst", fmt::format("{:.1f} %", s.end.bus_load_worst * 100), fmt::format("{} gaps", s.gaps()));
+  text +=
+      tile("duration", fmt::format("{:.2f} s", s.simulated_seconds()),
+           s.real_time_factor() > 0 ? fmt::format("{:.1f} × real time", s.real_time_factor()) : "");
+  text += tile("bus load, worst", fmt::format("{:.1f} %", s.end.bus_load_worst * 100),
+               fmt::format("{} gaps", s.gaps()));
   text += "</div>\n";
   if (!s.warnings.empty()) {
     text += "<ul class=\"warnings\">\n";
@@ -109,7 +125,8 @@ std::string figure(const std::string& script, const std::string& caption) {
   std::string why;
   const auto svg = draw_svg(script, why);
   return fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n",
-                     svg ? *svg : fmt::format("<div class=\"missing\">{}</div>", escaped(why)), caption);
+                     svg ? *svg : fmt::format("<div class=\"missing\">{}</div>", escaped(why)),
+                     caption);
 }
 
 struct BinLook {
@@ -140,20 +157,24 @@ std::string coverage_strip(const Summary& s) {
   text += "</svg><div class=\"legend\">";
   for (const BinLook& look : kBinLooks)
     if (const auto n = s.count(look.kind))
-      text += fmt::format("<span><i style=\"background:{}\"></i>{}: {} of {} bins</span>", look.colour, look.name, n,
-                          s.bins.size());
-  return text + fmt::format("</div><figcaption>Coverage of the path in bins of {:.2f} mm.</figcaption></figure>\n",
-                            s.bin_length * 1e3);
+      text += fmt::format("<span><i style=\"background:{}\"></i>{}: {} of {} bins</span>",
+                          look.colour, look.name, n, s.bins.size());
+  return text +
+         fmt::format(
+             "</div><figcaption>Coverage of the path in bins of {:.2f} mm.</figcaption></figure>\n",
+             s.bin_length * 1e3);
 }
 
 std::string error_table(const Summary& s) {
   std::string text =
-      "<table><tr><th>part of the path</th><th></th><th>max</th><th>min</th><th>mean</th><th>rms</th>"
+      "<table><tr><th>part of the "
+      "path</th><th></th><th>max</th><th>min</th><th>mean</th><th>rms</th>"
       "<th>p-p</th><th>samples</th></tr>\n";
   const auto row = [&](const std::string& name, const char* what, const Statistics& e) {
-    text += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
-                        "<td>{}</td></tr>\n",
-                        name, what, um(e.max), um(e.min), um(e.mean()), um(e.rms()), um(e.peak_to_peak()), e.count);
+    text += fmt::format(
+        "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
+        "<td>{}</td></tr>\n",
+        name, what, um(e.max), um(e.min), um(e.mean()), um(e.rms()), um(e.peak_to_peak()), e.count);
   };
   const ErrorGroup& whole = s.groups.front();
   row("<b>whole path</b>", "e<sub>n</sub>", whole.e_n);
@@ -162,21 +183,24 @@ std::string error_table(const Summary& s) {
   row("", "e<sub>rest</sub>", whole.e_rest);
   for (std::size_t i = 1; i < s.groups.size(); ++i)
     row(escaped(s.groups[i].name), "e<sub>n</sub>", s.groups[i].e_n);
-  return text + "</table>\n<p class=\"lead\">Errors in µm; + = the machine is away from the part. "
-                "Crossings: ±5 mm of path.</p>\n";
+  return text +
+         "</table>\n<p class=\"lead\">Errors in µm; + = the machine is away from the part. "
+         "Crossings: ±5 mm of path.</p>\n";
 }
 
 std::string axis_table(const Summary& s) {
   std::string text =
-      "<table><tr><th>axis</th><th>unit</th><th>max</th><th>rms</th><th>max on the path</th><th>rms on the path</th>"
+      "<table><tr><th>axis</th><th>unit</th><th>max</th><th>rms</th><th>max on the "
+      "path</th><th>rms on the path</th>"
       "<th>largest share in e<sub>n</sub> [µm]</th></tr>\n";
   for (std::size_t j = 0; j < kAxisCount; ++j) {
     const double scale = is_rotary(j) ? 3600 / kDegree : 1e6;
-    text += fmt::format("<tr><td>{}</td><td>{}</td><td>{:.3f}</td><td>{:.3f}</td><td>{:.3f}</td><td>{:.3f}</td>"
-                        "<td>{:.3f}</td></tr>\n",
-                        kAxisNames[j], is_rotary(j) ? "arcsec" : "µm", s.following[j].max_abs() * scale,
-                        s.following[j].rms() * scale, s.following_on_path[j].max_abs() * scale,
-                        s.following_on_path[j].rms() * scale, s.share[j].max_abs() * 1e6);
+    text += fmt::format(
+        "<tr><td>{}</td><td>{}</td><td>{:.3f}</td><td>{:.3f}</td><td>{:.3f}</td><td>{:.3f}</td>"
+        "<td>{:.3f}</td></tr>\n",
+        kAxisNames[j], is_rotary(j) ? "arcsec" : "µm", s.following[j].max_abs() * scale,
+        s.following[j].rms() * scale, s.following_on_path[j].max_abs() * scale,
+        s.following_on_path[j].rms() * scale, s.share[j].max_abs() * 1e6);
   }
   return text + "</table>\n";
 }
@@ -184,16 +208,19 @@ std::string axis_table(const Summary& s) {
 std::string circle_table(const Summary& s) {
   if (s.circles.empty()) return "";
   std::string text =
-      "<h2>Circular test</h2>\n<table><tr><th>sense</th><th>mean radius deviation</th><th>G</th><th>F max</th>"
-      "<th>F min</th><th>centre x, y</th><th>cos 2φ</th><th>sin 2φ</th><th>steps at 0, 90, 180, 270°</th></tr>\n";
+      "<h2>Circular test</h2>\n<table><tr><th>sense</th><th>mean radius "
+      "deviation</th><th>G</th><th>F max</th>"
+      "<th>F min</th><th>centre x, y</th><th>cos 2φ</th><th>sin 2φ</th><th>steps at 0, 90, 180, "
+      "270°</th></tr>\n";
   for (const auto& [direction, r] : s.circles) {
     std::string steps;
     for (const auto& step : r.step)
       steps += (steps.empty() ? "" : ", ") + (step ? um(*step) : std::string("–"));
-    text += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}, {}</td><td>{}</td>"
-                        "<td>{}</td><td>{}</td></tr>\n",
-                        direction > 0 ? "counter-clockwise" : "clockwise", um(r.mean), um(r.G), um(r.F_max),
-                        um(r.F_min), um(r.centre_x), um(r.centre_y), um(r.cos2), um(r.sin2), steps);
+    text += fmt::format(
+        "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}, {}</td><td>{}</td>"
+        "<td>{}</td><td>{}</td></tr>\n",
+        direction > 0 ? "counter-clockwise" : "clockwise", um(r.mean), um(r.G), um(r.F_max),
+        um(r.F_min), um(r.centre_x), um(r.centre_y), um(r.cos2), um(r.sin2), steps);
   }
   return text + "</table>\n<p class=\"lead\">ISO 230-4, least-squares centre; all in µm.</p>\n";
 }
@@ -204,11 +231,13 @@ std::string alarm_table(const Summary& s) {
   constexpr std::size_t kMost = 200;
   for (std::size_t i = 0; i < std::min(kMost, s.alarms.size()); ++i) {
     const Alarm& a = s.alarms[i];
-    text += fmt::format("<tr><td>{:.3f} s</td><td>{}</td><td>{}</td><td style=\"text-align:left\">{}</td></tr>\n",
-                        seconds(a.tick), escaped(a.source), a.code, escaped(a.text));
+    text += fmt::format(
+        "<tr><td>{:.3f} s</td><td>{}</td><td>{}</td><td style=\"text-align:left\">{}</td></tr>\n",
+        seconds(a.tick), escaped(a.source), a.code, escaped(a.text));
   }
   text += "</table>\n";
-  if (s.alarms.size() > kMost) text += fmt::format("<p>{} more alarms.</p>\n", s.alarms.size() - kMost);
+  if (s.alarms.size() > kMost)
+    text += fmt::format("<p>{} more alarms.</p>\n", s.alarms.size() - kMost);
   return text;
 }
 
@@ -224,19 +253,22 @@ std::string run_table(const Summary& s) {
   row("samples received, missing", fmt::format("{}, {}", s.rows, s.gaps()));
   row("trace hash", s.end.trace_hash.empty() ? "–" : s.end.trace_hash);
   row("seed", std::to_string(s.seed));
-  if (s.real_time_factor() > 0) row("speed", fmt::format("{:.1f} × real time", s.real_time_factor()));
+  if (s.real_time_factor() > 0)
+    row("speed", fmt::format("{:.1f} × real time", s.real_time_factor()));
   if (s.interference) {
     row("interference, programmed", fmt::format("{:.3f} mm", *s.interference * 1e3));
     row("interference, declared", fmt::format("{:.3f} mm", s.predeflection * 1e3));
   }
   if (s.line_length > 0)
-    row("scan line", fmt::format("{:.2f} mm long at z = {:.3f} mm", s.line_length * 1e3, s.line_z * 1e3));
+    row("scan line",
+        fmt::format("{:.2f} mm long at z = {:.3f} mm", s.line_length * 1e3, s.line_z * 1e3));
   return text + "</table>\n";
 }
 
 }  // namespace
 
-void write_report(const RecordingReader& recording, const Summary& s, const std::filesystem::path& path) {
+void write_report(const RecordingReader& recording, const Summary& s,
+                  const std::filesystem::path& path) {
   const Curves curves = collect_curves(recording, s);
   std::string html = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
@@ -248,29 +280,38 @@ void write_report(const RecordingReader& recording, const Summary& s, const std:
   if (measured) {
     double magnification = 1;
     const std::string script = path_figure(curves, s, magnification);
-    html += "<h2>Path</h2>\n" +
-            figure(script, fmt::format("Theoretical and actual path of the ball centre in workpiece coordinates; the "
-                                       "error and its tolerance are magnified {:g} times.",
-                                       magnification));
+    html +=
+        "<h2>Path</h2>\n" +
+        figure(script,
+               fmt::format(
+                   "Theoretical and actual path of the ball centre in workpiece coordinates; the "
+                   "error and its tolerance are magnified {:g} times.",
+                   magnification));
     html += "<h2>Error along the path</h2>\n" +
             figure(error_figure(curves, s),
-                   s.crossings.empty()
-                       ? "e<sub>n</sub> and its parts over the path."
-                       : "e<sub>n</sub> and its parts over the path. Numbered lines: crossings, where the wall "
-                         "changes between open and closed angle. Grey: end caps.");
+                   s.crossings.empty() ? "e<sub>n</sub> and its parts over the path."
+                                       : "e<sub>n</sub> and its parts over the path. Numbered "
+                                         "lines: crossings, where the wall "
+                                         "changes between open and closed angle. Grey: end caps.");
     html += coverage_strip(s);
     html += "<h2>Statistics</h2>\n" + error_table(s);
   }
   html += circle_table(s);
-  html += "<h2>Following error</h2>\n" + figure(following_figure(curves), "Measured minus commanded axis positions.") +
+  html += "<h2>Following error</h2>\n" +
+          figure(following_figure(curves), "Measured minus commanded axis positions.") +
           axis_table(s);
   if (measured)
     html += "<h2>Probe signals</h2>\n" +
             figure(lissajous_figure(curves),
-                   "Raw cosine and sine of the three channels, 1 = nominal amplitude. Dotted: limits of a 1 V<sub>pp</sub> "
+                   "Raw cosine and sine of the three channels, 1 = nominal amplitude. Dotted: "
+                   "limits of a 1 V<sub>pp</sub> "
                    "interface, 0.6 and 1.2.");
-  html += "<h2>Bus and feed</h2>\n" + figure(load_figure(curves), "Share of each cycle the bus is busy, and the feed.");
-  html += "<h2>Alarms</h2>\n" + alarm_table(s) + "<h2>Run</h2>\n" + run_table(s) + "</main></body></html>\n";
+  html += "<h2>Bus and feed</h2>\n" +
+          figure(load_figure(curves),
+                 "Share of each cycle the bus is busy, and the commanded feed; rapids "
+                 "leave the picture.");
+  html += "<h2>Alarms</h2>\n" + alarm_table(s) + "<h2>Run</h2>\n" + run_table(s) +
+          "</main></body></html>\n";
   write_whole_file(path, html);
 }
 

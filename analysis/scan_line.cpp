@@ -8,9 +8,9 @@
 namespace vcnc {
 namespace {
 
-constexpr double kStationStep = 0.5e-3;  ///< [m]
+constexpr double kStationStep = 0.5e-3;    ///< [m]
 constexpr double kTiltJump = 1 * kDegree;  ///< larger changes between stations are joints
-constexpr double kClosed = 1e-6;         ///< gap under which a line counts as closed [m]
+constexpr double kClosed = 1e-6;           ///< gap under which a line counts as closed [m]
 
 /// Tells the faces of a ruled piece apart by the foot's parameters and normal.
 Face face_of(const RuledSurface& mid, const SurfacePoint& foot) {
@@ -30,7 +30,8 @@ std::optional<RuledSurface> mid_surface(const PieceParams& p) {
 
 ScanLine::ScanLine(const Piece& piece, double ball_radius, double interference, double z)
     : stations_(piece.scan_path(ball_radius, interference, z, kStationStep)), z_(z) {
-  if (stations_.size() < 2) throw std::invalid_argument("the piece has no scan path at this height");
+  if (stations_.size() < 2)
+    throw std::invalid_argument("the piece has no scan path at this height");
   closed_ = (stations_.front().centre - stations_.back().centre).norm() < kClosed;
 
   const auto mid = mid_surface(piece.params());

@@ -20,7 +20,8 @@ AnalysisSession::~AnalysisSession() = default;
 
 void AnalysisSession::begin(const RunBegin& begin) {
   // A folder never mixes two runs.
-  for (const char* name : {kRecordingName, "summary.json", "summary.txt", "report.html", "rows.csv"})
+  for (const char* name :
+       {kRecordingName, "summary.json", "summary.txt", "report.html", "rows.csv"})
     std::filesystem::remove(options_.folder / name);
   summary_.reset();
   evaluation_ = std::make_unique<Evaluation>(begin);

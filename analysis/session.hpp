@@ -1,7 +1,7 @@
 // A run being analysed while it happens: records, evaluates live, writes the results at the end.
 //
-// Into its folder: recording.h5, summary.json, summary.txt, report.html and, on request, rows.csv. Results only
-// appear complete.
+// Into its folder: recording.h5, summary.json, summary.txt, report.html and, on request, rows.csv.
+// Results only appear complete.
 #pragma once
 
 #include <filesystem>
@@ -23,13 +23,13 @@ struct SessionOptions {
 
 /// How things stand, for a progress line.
 struct LiveView {
-  double t = 0;                    ///< [s]
-  int line = 0;                    ///< program line
+  double t = 0;  ///< [s]
+  int line = 0;  ///< program line
   bool on_path = false;
-  double e_n = 0;                  ///< now, on the path [m]
-  double e_n_max = 0, e_n_min = 0; ///< so far [m]
+  double e_n = 0;                   ///< now, on the path [m]
+  double e_n_max = 0, e_n_min = 0;  ///< so far [m]
   double coverage_percent = 0;
-  bool failed = false;             ///< the tolerance is exceeded: the run may end early
+  bool failed = false;  ///< the tolerance is exceeded: the run may end early
   std::size_t alarms = 0;
 };
 

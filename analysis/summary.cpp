@@ -14,8 +14,8 @@ namespace {
 double um(double metres) { return std::round(metres * 1e8) / 100 + 0.0; }
 
 std::string error_line(const char* name, const Statistics& s) {
-  return fmt::format("  {:<9}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}\n", name, um(s.max), um(s.min),
-                     um(s.mean()), um(s.rms()), um(s.peak_to_peak()));
+  return fmt::format("  {:<9}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}\n", name, um(s.max),
+                     um(s.min), um(s.mean()), um(s.rms()), um(s.peak_to_peak()));
 }
 
 std::string errors(const Summary& s) {
@@ -48,8 +48,8 @@ std::string following(const Summary& s) {
 
 std::string coverage(const Summary& s) {
   if (s.bins.empty()) return "";
-  std::string text = fmt::format("  coverage {:.1f} % of {:.1f} mm", s.coverage_percent,
-                                 s.line_length * 1e3);
+  std::string text =
+      fmt::format("  coverage {:.1f} % of {:.1f} mm", s.coverage_percent, s.line_length * 1e3);
   const auto add = [&](Coverage::Bin kind, const char* name) {
     if (const auto n = s.count(kind)) text += fmt::format(", {} {}", n, name);
   };
@@ -64,9 +64,12 @@ std::string coverage(const Summary& s) {
 
 std::string_view to_string(Verdict verdict) {
   switch (verdict) {
-    case Verdict::pass: return "PASS";
-    case Verdict::fail: return "FAIL";
-    case Verdict::incomplete: break;
+    case Verdict::pass:
+      return "PASS";
+    case Verdict::fail:
+      return "FAIL";
+    case Verdict::incomplete:
+      break;
   }
   return "INCOMPLETE";
 }

@@ -56,7 +56,7 @@ struct Summary {
   std::optional<double> interference;       ///< that the program really has, median [m]
   double line_length = 0, line_z = 0;       ///< 0: no scan line was followed [m]
   bool line_closed = false;
-  double last_station = 0;                  ///< largest station or travel on the path [m]
+  double last_station = 0;  ///< largest station or travel on the path [m]
   std::vector<CrossingMark> crossings;
   std::vector<Coverage::Bin> bins;
   double bin_length = 0;

@@ -84,8 +84,11 @@ Json circles(const Summary& s) {
 Json alarms(const Summary& s) {
   Json list = Json::array();
   for (const Alarm& a : s.alarms)
-    list.push_back({{"t_s", seconds(a.tick)}, {"tick", a.tick}, {"code", a.code},
-                    {"source", a.source}, {"text", a.text}});
+    list.push_back({{"t_s", seconds(a.tick)},
+                    {"tick", a.tick},
+                    {"code", a.code},
+                    {"source", a.source},
+                    {"text", a.text}});
   return list;
 }
 
@@ -100,38 +103,37 @@ Json crossings(const Summary& s) {
 std::string to_json(const Summary& s) {
   const ErrorGroup& whole = s.groups.front();
   const double factor = s.real_time_factor();
-  const Json json{
-      {"run_id", s.run_id},
-      {"program", s.program_name},
-      {"machine", s.machine_name},
-      {"piece", s.piece_name},
-      {"seed", s.seed},
-      {"complete", s.end.complete},
-      {"reason", s.end.reason},
-      {"trace_hash", s.end.trace_hash},
-      {"cycles", s.end.cycles},
-      {"rows", s.rows},
-      {"real_time_factor", factor > 0 ? Json(factor) : Json()},
-      {"bus_load_worst", s.end.bus_load_worst},
-      {"gaps", s.gaps()},
-      {"verdict", to_string(s.verdict)},
-      {"verdict_reason", s.verdict_reason},
-      {"tolerance_um", s.tolerance * 1e6},
-      {"predeflection_um", s.predeflection * 1e6},
-      {"interference_um", s.interference ? Json(*s.interference * 1e6) : Json()},
-      {"e_n_um", error_statistics(whole.e_n)},
-      {"e_plan_um", error_statistics(whole.e_plan)},
-      {"e_servo_um", error_statistics(whole.e_servo)},
-      {"e_rest_um", error_statistics(whole.e_rest)},
-      {"coverage", coverage(s)},
-      {"following_error", axes(s)},
-      {"lag_um", error_statistics(s.lag)},
-      {"cross_um", error_statistics(s.cross)},
-      {"parts", groups(s)},
-      {"crossings", crossings(s)},
-      {"circles", circles(s)},
-      {"alarms", alarms(s)},
-      {"warnings", s.warnings}};
+  const Json json{{"run_id", s.run_id},
+                  {"program", s.program_name},
+                  {"machine", s.machine_name},
+                  {"piece", s.piece_name},
+                  {"seed", s.seed},
+                  {"complete", s.end.complete},
+                  {"reason", s.end.reason},
+                  {"trace_hash", s.end.trace_hash},
+                  {"cycles", s.end.cycles},
+                  {"rows", s.rows},
+                  {"real_time_factor", factor > 0 ? Json(factor) : Json()},
+                  {"bus_load_worst", s.end.bus_load_worst},
+                  {"gaps", s.gaps()},
+                  {"verdict", to_string(s.verdict)},
+                  {"verdict_reason", s.verdict_reason},
+                  {"tolerance_um", s.tolerance * 1e6},
+                  {"predeflection_um", s.predeflection * 1e6},
+                  {"interference_um", s.interference ? Json(*s.interference * 1e6) : Json()},
+                  {"e_n_um", error_statistics(whole.e_n)},
+                  {"e_plan_um", error_statistics(whole.e_plan)},
+                  {"e_servo_um", error_statistics(whole.e_servo)},
+                  {"e_rest_um", error_statistics(whole.e_rest)},
+                  {"coverage", coverage(s)},
+                  {"following_error", axes(s)},
+                  {"lag_um", error_statistics(s.lag)},
+                  {"cross_um", error_statistics(s.cross)},
+                  {"parts", groups(s)},
+                  {"crossings", crossings(s)},
+                  {"circles", circles(s)},
+                  {"alarms", alarms(s)},
+                  {"warnings", s.warnings}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

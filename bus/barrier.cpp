@@ -85,22 +85,19 @@ bool Barrier::collect(Tick k, Frames& answers, int timeout_ms) {
   return true;
 }
 
-bool Barrier::all_in_state(NmtState state, int timeout_ms) {
+Transport::Received Barrier::hear(NmtState state, int timeout_ms) {
   scratch_.clear();
-  switch (bus_.receive(scratch_, timeout_ms)) {
-    case Transport::Received::closed: throw BarrierError("the bus was closed during start-up");
-    case Transport::Received::timeout: break;
-    case Transport::Received::frames:
-      for (const Frame& frame : scratch_) {
-        const auto heartbeat = decode_heartbeat(frame);
-        if (!heartbeat || !expected_[static_cast<std::size_t>(heartbeat->node)]) continue;
-        if (heartbeat->state == NmtState::stopped)
-          throw BarrierError(fmt::format("{} left the bus during start-up", name(heartbeat->node)));
-        if (heartbeat->state == state) arrived_.set(static_cast<std::size_t>(heartbeat->node));
-      }
-      break;
+  const Transport::Received received = bus_.receive(scratch_, timeout_ms);
+  if (received == Transport::Received::closed)
+    throw BarrierError("the bus was closed during start-up");
+  for (const Frame& frame : scratch_) {
+    const auto heartbeat = decode_heartbeat(frame);
+    if (!heartbeat || !expected_[static_cast<std::size_t>(heartbeat->node)]) continue;
+    if (heartbeat->state == NmtState::stopped)
+      throw BarrierError(fmt::format("{} left the bus during start-up", name(heartbeat->node)));
+    if (heartbeat->state == state) arrived_.set(static_cast<std::size_t>(heartbeat->node));
   }
-  return complete();
+  return received;
 }
 
 }  // namespace vcnc

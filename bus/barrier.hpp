@@ -32,21 +32,22 @@ class Barrier {
   Barrier(Transport& bus, const Roster& roster, const std::atomic<bool>* stop = nullptr);
 
   /// Appends all frames of cycle k to `answers`; returns when each node's cyclic frame (COB-ID
-  /// 180h + id, sent as its last) is there. False if `stop` was set meanwhile. Throws BarrierError if a
-  /// node stays silent for timeout_ms, answers twice, restarts or leaves.
+  /// 180h + id, sent as its last) is there. False if `stop` was set meanwhile. Throws BarrierError
+  /// if a node stays silent for timeout_ms, answers twice, restarts or leaves.
   bool collect(Tick k, Frames& answers, int timeout_ms);
 
-  /// Waits up to timeout_ms for a heartbeat with this state from every node that has not sent one
-  /// since `forget()`; other frames are dropped. True when all have.
-  bool all_in_state(NmtState state, int timeout_ms);
+  /// Start-up: takes what arrives within timeout_ms and notes the nodes whose heartbeat shows this
+  /// state; other frames are dropped. Throws BarrierError if the bus is closed or a node leaves it.
+  Transport::Received hear(NmtState state, int timeout_ms);
   void forget() { arrived_.reset(); }
+  /// Whether every node of the roster has arrived since forget().
+  bool complete() const { return (arrived_ & expected_) == expected_; }
 
   /// Names of those that have not arrived: "drive A, probe".
   std::string missing() const;
 
  private:
   using Ids = std::bitset<128>;
-  bool complete() const { return (arrived_ & expected_) == expected_; }
   void note(Tick k, const Frame& frame);
   const std::string& name(int id) const;
 

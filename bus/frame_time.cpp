@@ -8,8 +8,8 @@ namespace vcnc {
 
 namespace {
 
-/// Bit stuffing: after five equal bits one complementary bit is inserted. State: the last bit and the
-/// length (1..4) of the run it ends, coded 4 * bit + length - 1.
+/// Bit stuffing: after five equal bits one complementary bit is inserted. State: the last bit and
+/// the length (1..4) of the run it ends, coded 4 * bit + length - 1.
 struct Step {
   std::uint8_t stuffed = 0;  ///< bits inserted
   std::uint8_t state = 0;
@@ -103,7 +103,8 @@ FrameBits flexible(const Frame& frame) {
     stuffed += step.stuffed;
   }
   if (step.ends_stuffed) --stuffed;  // the first fixed stuff bit of the CRC field stands for it
-  return {29 + kArbitration[frame.id & 0x7ff], 6 + 8 * frame.len + fd_crc_bits(frame.len) + stuffed};
+  return {29 + kArbitration[frame.id & 0x7ff],
+          6 + 8 * frame.len + fd_crc_bits(frame.len) + stuffed};
 }
 
 }  // namespace

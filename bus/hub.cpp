@@ -24,8 +24,8 @@ constexpr int kNoId = -1;
 struct Client {
   Fd fd;
   int id = kNoId;
-  std::uint64_t lost = 0;          ///< frames its full queue refused
-  bool answered = false;           ///< since the master's last datagram
+  std::uint64_t lost = 0;  ///< frames its full queue refused
+  bool answered = false;   ///< since the master's last datagram
   bool gone = false;
   std::vector<std::uint8_t> said;  ///< held for the other nodes
   std::size_t said_frames = 0;
@@ -133,7 +133,8 @@ void Hub::Service::accept() {
 
 void Hub::Service::serve(Client& client) {
   const ssize_t got = ::recv(client.fd.get(), incoming_.data(), incoming_.size(), MSG_TRUNC);
-  if (got < 0 && (errno == EAGAIN || errno == EINTR)) return;
+  // A reset is told once, ahead of what the client said before it closed.
+  if (got < 0 && (errno == EAGAIN || errno == EINTR || errno == ECONNRESET)) return;
   if (got <= 0 || static_cast<std::size_t>(got) > incoming_.size()) return drop(client);
   const std::span<const std::uint8_t> slot(incoming_.data(), static_cast<std::size_t>(got));
   if (client.id == kNoId) return greet(client, slot);
@@ -189,8 +190,7 @@ void Hub::Service::from_master(std::span<const std::uint8_t> slot, std::size_t f
   }
 }
 
-void Hub::Service::from_node(Client& node, std::span<const std::uint8_t> slot,
-                             std::size_t frames) {
+void Hub::Service::from_node(Client& node, std::span<const std::uint8_t> slot, std::size_t frames) {
   if (master_ == nullptr) return;  // a bus without a master does not run
   node.answered = true;
   if (node.said.size() + slot.size() > kLargestSlot) {
@@ -264,7 +264,9 @@ bool Hub::Service::all_answered() const {
 }
 
 Hub::Hub(const std::string& path)
-    : path_(path), service_(std::make_unique<Service>(path)), thread_([this] { service_->run(); }) {}
+    : path_(path),
+      service_(std::make_unique<Service>(path)),
+      thread_([this] { service_->run(); }) {}
 
 Hub::~Hub() {
   service_->stop();

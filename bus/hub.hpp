@@ -1,21 +1,22 @@
 // The embedded bus between processes: a hub and its clients over AF_UNIX SOCK_SEQPACKET.
 //
-// Batching. One datagram carries all frames of a slot. What the nodes say in a cycle is held in the hub
-// and handed to the other nodes together with the master's next datagram, the one with SYNC; latch on
-// SYNC makes that equivalent to handing it over at once, and a node is woken once per cycle. Answers
-// for the master are held until every node that is connected has answered, or for 10 ms.
+// Batching. One datagram carries all frames of a slot. What the nodes say in a cycle is held in the
+// hub and handed to the other nodes together with the master's next datagram, the one with SYNC;
+// latch on SYNC makes that equivalent to handing it over at once, and a node is woken once per
+// cycle. Answers for the master are held until every node that is connected has answered, or for 10
+// ms.
 //
 // End of file means that the module has died. The hub then speaks for a dead node: it sends the
-// master a heartbeat "stopped" (700h+id, 04), so that the master can name it. When the master is gone
-// the nodes' connections are closed.
+// master a heartbeat "stopped" (700h+id, 04), so that the master can name it. When the master is
+// gone the nodes' connections are closed.
 //
 // Taps are passive clients (node id 255) that see everything. The hub never waits for a client: a
 // datagram that a full queue refuses is counted, and the client is told with the next one
 // (Transport::lost).
 //
-// Datagrams. Client to hub: first {'V','C','H', version, node id}, answered by one byte (0 welcome, 1
-// id in use, 2 wrong version); then slots. Hub to client: u64 number of frames lost, then a
-// slot. A slot is a row of {u16 id, u8 length, u8 1 = FD, payload}. All little-endian.
+// Datagrams. Client to hub: first {'V','C','H', version, node id}, answered by one byte (0 welcome,
+// 1 id in use, 2 wrong version); then slots. Hub to client: u64 number of frames lost, then a slot.
+// A slot is a row of {u16 id, u8 length, u8 1 = FD, payload}. All little-endian.
 #pragma once
 
 #include <atomic>

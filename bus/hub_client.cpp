@@ -30,11 +30,12 @@ HubTransport::HubTransport(const std::string& path, int node_id)
     : master_(node_id == 0), tap_(node_id == kTapId), incoming_(1 << 18) {
   const sockaddr_un address = hub_address(path);
   if (node_id < 0 || (node_id > 127 && node_id != kTapId))
-    throw BusError(fmt::format("hub \"{}\": node id {}: allowed are 0..127 and 255", path, node_id));
+    throw BusError(
+        fmt::format("hub \"{}\": node id {}: allowed are 0..127 and 255", path, node_id));
   fd_ = Fd(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
   if (!fd_.valid() || connect_to(fd_.get(), address) != 0)
-    throw BusError(fmt::format("no hub at \"{}\" ({}): is the machine running?", path,
-                               std::strerror(errno)));
+    throw BusError(
+        fmt::format("no hub at \"{}\" ({}): is the machine running?", path, std::strerror(errno)));
   const std::uint8_t hello[kHelloSize] = {'V', 'C', 'H', kHubVersion,
                                           static_cast<std::uint8_t>(node_id)};
   set_timeout(fd_.get(), kWelcomeTimeoutMs);
@@ -43,7 +44,8 @@ HubTransport::HubTransport(const std::string& path, int node_id)
       ::recv(fd_.get(), &reply, 1, 0) != 1)
     throw BusError(fmt::format("hub \"{}\" does not answer", path));
   switch (Welcome{reply}) {
-    case Welcome::ok: break;
+    case Welcome::ok:
+      break;
     case Welcome::id_in_use:
       throw BusError(fmt::format("hub \"{}\": node id {} is already on the bus", path, node_id));
     case Welcome::wrong_version:
@@ -90,8 +92,7 @@ Transport::Received HubTransport::receive(Frames& into, int timeout_ms) {
         !parse_slot({incoming_.data() + kLostHeader, size - kLostHeader}, into))
       throw BusError("hub: received a datagram that is no slot");
     lost_ = 0;
-    for (std::size_t i = 0; i < kLostHeader; ++i)
-      lost_ |= std::uint64_t{incoming_[i]} << (8 * i);
+    for (std::size_t i = 0; i < kLostHeader; ++i) lost_ |= std::uint64_t{incoming_[i]} << (8 * i);
     if (size > kLostHeader) return Received::frames;
   }
 }

@@ -1,8 +1,8 @@
 // The bus inside one process: the same frames and the same protocol, moved by function calls.
 //
 // send() of the master runs every node that a SYNC in the slot addresses, in the order given, at
-// once; their answers wait for receive(). Nodes see each other's frames in the next cycle only, as on
-// every transport, so the order does not matter. One thread; no allocation once the buffers have
+// once; their answers wait for receive(). Nodes see each other's frames in the next cycle only, as
+// on every transport, so the order does not matter. One thread; no allocation once the buffers have
 // grown.
 #pragma once
 

@@ -20,38 +20,38 @@ bool is_set(const std::atomic<bool>* flag) {
 
 void send(Transport& bus, const Frame& frame) { bus.send({&frame, 1}); }
 
-/// Waits for a heartbeat of each node within what is left of the start-up time, repeating `request`.
-/// A time-out counts as the time it was asked for even if the transport gave up at once, so a bus
-/// without clock (in-process) ends too. False if stopped from outside.
-bool await_state(Barrier& barrier, Transport& bus, Nmt request, bool repeat, NmtState state,
-                 const MainLoopOptions& options, double& patience_s) {
-  barrier.forget();
-  send(bus, encode(request));
-  for (;;) {
-    if (is_set(options.stop)) return false;
-    const double begin_s = options.pacer.elapsed();
-    double left_s = kResetPeriodMs * 1e-3;
-    bool heard = true;
-    while (heard && left_s > 0) {
-      const std::string before = barrier.missing();
-      if (barrier.all_in_state(state, std::max(1, static_cast<int>(left_s * 1e3)))) return true;
-      heard = barrier.missing() != before;
-      left_s = kResetPeriodMs * 1e-3 - (options.pacer.elapsed() - begin_s);
-    }
-    patience_s -= kResetPeriodMs * 1e-3;
-    if (patience_s <= 0)
-      throw BarrierError(fmt::format("not on the bus within {:.3g} s: {}",
-                                     options.start_timeout_ms * 1e-3, barrier.missing()));
-    if (repeat) send(bus, encode(request));
+/// Listens for heartbeats until all nodes show `state` or the period is over. A time-out ends the
+/// period even if the transport gave up at once, so a bus on which nothing can arrive ends too.
+void listen(Barrier& barrier, NmtState state, const Pacer& pacer) {
+  const double end_s = pacer.elapsed() + kResetPeriodMs * 1e-3;
+  while (!barrier.complete()) {
+    const int left_ms = static_cast<int>((end_s - pacer.elapsed()) * 1e3);
+    if (left_ms <= 0 || barrier.hear(state, left_ms) == Transport::Received::timeout) return;
   }
 }
 
+/// Waits until all nodes show `state`, `periods` times at most. False if stopped from outside.
+bool await_state(Barrier& barrier, Transport& bus, NmtCommand command, bool repeat, NmtState state,
+                 const MainLoopOptions& options, int& periods) {
+  barrier.forget();
+  send(bus, encode(Nmt{command, 0}));
+  while (!is_set(options.stop)) {
+    listen(barrier, state, options.pacer);
+    if (barrier.complete()) return true;
+    if (--periods <= 0)
+      throw BarrierError(fmt::format("not on the bus within {:.3g} s: {}",
+                                     options.start_timeout_ms * 1e-3, barrier.missing()));
+    if (repeat) send(bus, encode(Nmt{command, 0}));
+  }
+  return false;
+}
+
 bool start_up(Barrier& barrier, Transport& bus, const MainLoopOptions& options) {
-  double patience_s = options.start_timeout_ms * 1e-3;
-  return await_state(barrier, bus, {NmtCommand::reset_comm, 0}, true, NmtState::boot_up, options,
-                     patience_s) &&
-         await_state(barrier, bus, {NmtCommand::start, 0}, false, NmtState::operational, options,
-                     patience_s);
+  int periods = std::max(1, options.start_timeout_ms / kResetPeriodMs);
+  return await_state(barrier, bus, NmtCommand::reset_comm, true, NmtState::boot_up, options,
+                     periods) &&
+         await_state(barrier, bus, NmtCommand::start, false, NmtState::operational, options,
+                     periods);
 }
 
 /// The verbs of a cycle; see the header for their order and meaning.

@@ -8,9 +8,9 @@
 //   log       the frames of cycle k by identifier: trace hash, bus load, taps
 //
 // Before that, start-up: NMT "reset communication" every 200 ms until every node of the roster has
-// sent its boot-up message, then NMT "start" until every node says that it is operational. Whatever a
-// node sent before lies in front of that answer, so cycle 0 begins with an empty bus. The roster is
-// then frozen: a node that restarts, answers twice or leaves ends the run. After the last cycle,
+// sent its boot-up message, then NMT "start" until every node says that it is operational. Whatever
+// a node sent before lies in front of that answer, so cycle 0 begins with an empty bus. The roster
+// is then frozen: a node that restarts, answers twice or leaves ends the run. After the last cycle,
 // whatever the reason, NMT "stop".
 #pragma once
 
@@ -53,8 +53,8 @@ struct MainLoopResult {
   std::uint64_t lost = 0;     ///< frames the host dropped on the way to the master
 };
 
-/// Runs until the master is done, the bus fails or `stop` is set. Failures of the bus and of nodes are
-/// in the result; exceptions of the master pass through after NMT "stop".
+/// Runs until the master is done, the bus fails or `stop` is set. Failures of the bus and of nodes
+/// are in the result; exceptions of the master pass through after NMT "stop".
 MainLoopResult run_main_loop(Master& master, Transport& bus, const Roster& roster,
                              const MainLoopOptions& options);
 

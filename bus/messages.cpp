@@ -21,13 +21,14 @@ T as(double value) {
 
 // An accessor pair for a member expression of message `m` with an integer or enumeration type, and
 // one for a double.
-#define VCNC_INTEGER(M, member)                                                                    \
-  [](const M& m) { return static_cast<double>(m.member); },                                        \
+#define VCNC_INTEGER(M, member)                             \
+  [](const M& m) { return static_cast<double>(m.member); }, \
       [](M& m, double v) { m.member = as<std::remove_cvref_t<decltype(m.member)>>(v); }
-#define VCNC_NUMBER(M, member)                                                                     \
+#define VCNC_NUMBER(M, member) \
   [](const M& m) { return m.member; }, [](M& m, double v) { m.member = v; }
 
 // name, unit, offset, bytes, signed, counts per unit, accessors
+// clang-format off
 constexpr std::array<Field<Nmt>, 2> kNmt{{
     {"command", "", 0, 1, false, kCount, VCNC_INTEGER(Nmt, command)},
     {"node", "", 1, 1, false, kCount, VCNC_INTEGER(Nmt, node)},
@@ -98,6 +99,7 @@ constexpr std::array<Field<OvertravelState>, 4> kOvertravelState{{
     {"deflection", "m", 4, 4, true, kLength, VCNC_NUMBER(OvertravelState, deflection)},
 }};
 
+// clang-format on
 #undef VCNC_INTEGER
 #undef VCNC_NUMBER
 
@@ -178,7 +180,8 @@ std::optional<Nmt> decode_nmt(const Frame& frame) {
     case NmtCommand::stop:
     case NmtCommand::preop:
     case NmtCommand::reset_node:
-    case NmtCommand::reset_comm: return m;
+    case NmtCommand::reset_comm:
+      return m;
   }
   return std::nullopt;
 }
@@ -198,7 +201,8 @@ std::optional<Heartbeat> decode_heartbeat(const Frame& frame) {
     case NmtState::boot_up:
     case NmtState::stopped:
     case NmtState::operational:
-    case NmtState::pre_operational: return m;
+    case NmtState::pre_operational:
+      return m;
   }
   return std::nullopt;
 }

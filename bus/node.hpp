@@ -1,8 +1,8 @@
 // What a module on the bus is: a pure step.
 //
-// A node owns no socket, thread, clock, sleep or file. Cycle k begins with SYNC(k); the node is then
-// given every frame that was sent in cycle k-1 and that it accepts, in CAN-ID order, steps its own
-// state through [t_k, t_k+1) and answers. So a frame sent in cycle k acts from cycle k+1 on,
+// A node owns no socket, thread, clock, sleep or file. Cycle k begins with SYNC(k); the node is
+// then given every frame that was sent in cycle k-1 and that it accepts, in CAN-ID order, steps its
+// own state through [t_k, t_k+1) and answers. So a frame sent in cycle k acts from cycle k+1 on,
 // whatever the transport and the scheduling of the host.
 #pragma once
 
@@ -17,8 +17,8 @@ namespace vcnc {
 class Node {
  public:
   virtual ~Node() = default;
-  virtual int id() const = 0;                          ///< CANopen node id, 1..127
-  virtual std::string_view name() const = 0;           ///< for people: "drive X", "probe"
+  virtual int id() const = 0;                 ///< CANopen node id, 1..127
+  virtual std::string_view name() const = 0;  ///< for people: "drive X", "probe"
   /// Acceptance filter; asked once for every identifier, so it must not change. NMT, SYNC and
   /// heartbeats never reach a node: NodeShell handles them.
   virtual bool accepts(std::uint16_t cob_id) const = 0;

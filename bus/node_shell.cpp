@@ -104,8 +104,7 @@ void NodeShell::report_faults(Frames& out) {
                         .error_register = 0x11};
     emergency.detail[0] = static_cast<std::uint8_t>(fault + 1);
     for (std::size_t byte = 0; byte < 4; ++byte)
-      emergency.detail[byte + 1] =
-          static_cast<std::uint8_t>(fault_count_[fault] >> (8 * byte));
+      emergency.detail[byte + 1] = static_cast<std::uint8_t>(fault_count_[fault] >> (8 * byte));
     out.push_back(encode(emergency));
   }
 }

@@ -4,12 +4,12 @@
 //   NMT start    -> heartbeat "operational" (05); the next SYNC is tick 0
 //   NMT stop     -> over() becomes true
 //   SYNC(k)      -> the frames accepted since SYNC(k-1) are handed to Node::step in CAN-ID order;
-//                   its answers follow, the cyclic frame (180h+id) last, so that whoever has received
-//                   that one has received them all
+//                   its answers follow, the cyclic frame (180h+id) last, so that whoever has
+//                   received that one has received them all
 //
 // The SYNC counter 1..240 is unwrapped to a 64-bit tick. A SYNC that is missing or comes twice, a
-// second cyclic frame of one sender in a cycle, and frames lost by the host are counted, and the first
-// of each kind raises an EMCY with the answer: 8100h, or 8110h for frames the host lost
+// second cyclic frame of one sender in a cycle, and frames lost by the host are counted, and the
+// first of each kind raises an EMCY with the answer: 8100h, or 8110h for frames the host lost
 // (detail: 1 missed, 2 repeated, 3 double frame, 4 lost; then the count, 32 bit).
 #pragma once
 

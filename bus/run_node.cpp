@@ -13,9 +13,12 @@ NodeExit run_node(Node& node, Transport& bus, const std::atomic<bool>* stop) {
   while (stop == nullptr || !stop->load(std::memory_order_relaxed)) {
     arrived.clear();
     switch (bus.receive(arrived, stop == nullptr ? -1 : kStopCheckMs)) {
-      case Transport::Received::timeout: continue;
-      case Transport::Received::closed: return NodeExit::closed;
-      case Transport::Received::frames: break;
+      case Transport::Received::timeout:
+        continue;
+      case Transport::Received::closed:
+        return NodeExit::closed;
+      case Transport::Received::frames:
+        break;
     }
     shell.note_lost(bus.lost());
     answer.clear();

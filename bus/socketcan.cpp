@@ -29,21 +29,26 @@ constexpr std::uint8_t kFdfFlag = 0x04;  // CANFD_FDF, missing in older kernel h
   switch (error) {
     case ENODEV:
     case ENXIO:
-      throw text(fmt::format("there is no such interface; make it with: ip link add dev {0} type "
-                             "vcan && ip link set {0} mtu 72 up",
-                             interface));
+      throw text(
+          fmt::format("there is no such interface; make it with: ip link add dev {0} type "
+                      "vcan && ip link set {0} mtu 72 up",
+                      interface));
     case ENETDOWN:
-      throw text(fmt::format("the interface is down; bring it up with: ip link set {} up", interface));
+      throw text(
+          fmt::format("the interface is down; bring it up with: ip link set {} up", interface));
     case EAFNOSUPPORT:
     case EPROTONOSUPPORT:
       throw text("this kernel has no CAN; load it with: modprobe can_raw, or use hub://");
     case EPERM:
-    case EACCES: throw text("not permitted to open a CAN socket here");
+    case EACCES:
+      throw text("not permitted to open a CAN socket here");
     case ENOBUFS:
-      throw text(fmt::format("the send queue stayed full for {} ms; enlarge it with: ip link set {} "
-                             "txqueuelen 1000",
-                             kSendPatienceMs, interface));
-    default: throw text(std::strerror(error));
+      throw text(
+          fmt::format("the send queue stayed full for {} ms; enlarge it with: ip link set {} "
+                      "txqueuelen 1000",
+                      kSendPatienceMs, interface));
+    default:
+      throw text(std::strerror(error));
   }
 }
 

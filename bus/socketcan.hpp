@@ -19,7 +19,8 @@ namespace vcnc {
 
 class SocketcanTransport : public Transport {
  public:
-  /// Throws BusError with the remedy if the interface is not there, is down or cannot carry FD frames.
+  /// Throws BusError with the remedy if the interface is not there, is down or cannot carry FD
+  /// frames.
   explicit SocketcanTransport(const std::string& interface);
   ~SocketcanTransport() override;
 

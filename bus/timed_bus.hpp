@@ -17,7 +17,7 @@ class TimedBus {
  public:
   struct Request {
     std::uint16_t id = 0;
-    std::int64_t ready_ns = 0;     ///< since the start of the cycle
+    std::int64_t ready_ns = 0;  ///< since the start of the cycle
     std::int64_t duration_ns = 0;
   };
   struct Slot {

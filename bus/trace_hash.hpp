@@ -1,7 +1,8 @@
 // One number for a whole run: XXH3 (128 bit) over every frame of every cycle.
 //
-// Two runs with the same hash have exchanged the same bytes in the same cycles. Hashed are, per cycle,
-// the tick and each frame's identifier, length, kind and payload, in order of the identifiers.
+// Two runs with the same hash have exchanged the same bytes in the same cycles. Hashed are, per
+// cycle, the tick and each frame's identifier, length, kind and payload, in order of the
+// identifiers.
 #pragma once
 
 #include <cstdint>

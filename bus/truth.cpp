@@ -64,8 +64,8 @@ sockaddr_un address_of(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.empty() || path.size() >= sizeof address.sun_path)
-    throw TruthError(fmt::format("truth channel \"{}\": the path must have 1 to {} characters", path,
-                                 sizeof address.sun_path - 1));
+    throw TruthError(fmt::format("truth channel \"{}\": the path must have 1 to {} characters",
+                                 path, sizeof address.sun_path - 1));
   std::memcpy(address.sun_path, path.data(), path.size());
   return address;
 }

@@ -11,8 +11,8 @@ namespace vcnc {
 
 namespace {
 
-constexpr std::array<std::string_view, 8> kNodeNames{"X",       "Y",     "Z",         "A", "C",
-                                                     "Spindle", "Probe", "Overtravel"};
+constexpr std::array<std::string_view, 8> kNodeNames{"X", "Y",       "Z",     "A",
+                                                     "C", "Spindle", "Probe", "Overtravel"};
 
 std::string_view node_name(int node) { return kNodeNames.at(static_cast<std::size_t>(node - 1)); }
 
@@ -53,8 +53,10 @@ void for_each_identifier(const Visit& visit) {
 std::string wire_table_markdown() {
   std::string text =
       "# Messages on the bus\n\n"
-      "Generated from the message tables in `bus/messages.cpp`. All numbers are little-endian; value = "
-      "code * scale.\nSigned fields are symmetric; the most negative code means \"not a number\". Bytes "
+      "Generated from the message tables in `bus/messages.cpp`. All numbers are little-endian; "
+      "value = "
+      "code * scale.\nSigned fields are symmetric; the most negative code means \"not a number\". "
+      "Bytes "
       "without a field are 0.\n";
   for (const WireMessage& m : wire_messages()) {
     text += fmt::format("\n## {} ({}, {} byte{}, {})\n\nSent by: {}\n\n", m.name, identifiers(m),

@@ -29,9 +29,7 @@ struct Field {
 };
 
 /// The raw code of "not a number", outside the range of values: the most negative one.
-constexpr std::int64_t invalid_code(int bytes) {
-  return -(std::int64_t{1} << (8 * bytes - 1));
-}
+constexpr std::int64_t invalid_code(int bytes) { return -(std::int64_t{1} << (8 * bytes - 1)); }
 constexpr std::int64_t largest_code(int bytes, bool is_signed) {
   return (std::int64_t{1} << (8 * bytes - (is_signed ? 1 : 0))) - 1;
 }
@@ -75,15 +73,13 @@ void take(const Field<M>& field, const Frame& frame, M& message) {
 /// All fields of a table that is a compile-time constant, so that its accessors are inlined.
 template <const auto& kTable, class M>
 void put_all(const M& message, Frame& frame) {
-  [&]<std::size_t... i>(std::index_sequence<i...>) {
-    (put(kTable[i], message, frame), ...);
-  }(std::make_index_sequence<std::tuple_size_v<std::remove_cvref_t<decltype(kTable)>>>{});
+  [&]<std::size_t... i>(std::index_sequence<i...>) { (put(kTable[i], message, frame), ...); }
+  (std::make_index_sequence<std::tuple_size_v<std::remove_cvref_t<decltype(kTable)>>>{});
 }
 template <const auto& kTable, class M>
 void take_all(const Frame& frame, M& message) {
-  [&]<std::size_t... i>(std::index_sequence<i...>) {
-    (take(kTable[i], frame, message), ...);
-  }(std::make_index_sequence<std::tuple_size_v<std::remove_cvref_t<decltype(kTable)>>>{});
+  [&]<std::size_t... i>(std::index_sequence<i...>) { (take(kTable[i], frame, message), ...); }
+  (std::make_index_sequence<std::tuple_size_v<std::remove_cvref_t<decltype(kTable)>>>{});
 }
 
 }  // namespace vcnc::wire

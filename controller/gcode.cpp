@@ -2,24 +2,15 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <cmath>
-#include <map>
 #include <stdexcept>
 
 namespace vcnc {
 namespace {
 
-constexpr std::string_view kAxisLetters = "XYZAC";
-constexpr double kRadiusTolerance = 2e-6, kRadiusToleranceShare = 1e-3;
-constexpr double kLargestTolerance = 5e-3;
+using Group = GcodeLine::Group;
+using MGroup = GcodeLine::MGroup;
 
-Coordinates start_position(const Machine& machine) {
-  Coordinates q;
-  for (std::size_t i = 0; i < kAxisCount; ++i)
-    q[static_cast<Eigen::Index>(i)] = machine.axes[i].limits.start;
-  return q;
-}
+constexpr double kLargestTolerance = 5e-3;
 
 }  // namespace
 
@@ -27,7 +18,7 @@ GcodeInterpreter::GcodeInterpreter(const std::string& path, const Machine& machi
     : machine_(machine),
       lines_(path),
       map_(machine.kinematics, {}),
-      position_(start_position(machine)) {
+      position_(start_coordinates(machine)) {
   modal_.tolerance = machine.nc.blend_tolerance;
 }
 
@@ -51,7 +42,7 @@ Block GcodeInterpreter::next() {
 }
 
 void GcodeInterpreter::read_line(const std::string& text) {
-  const Line line = sort_words(split_words(text, lines_.where()));
+  const GcodeLine line = sort_words(split_words(text, lines_.where()), lines_.where());
   const bool dwell = line.is(Group::once, 40), reference = line.is(Group::once, 280);
   const bool motion_word = line.g.contains(Group::motion);
   if ((dwell || reference) && motion_word)
@@ -87,7 +78,7 @@ void GcodeInterpreter::read_line(const std::string& text) {
 
 // --------------------------------------------------------------------------------------- modes
 
-void GcodeInterpreter::set_modes(const Line& line) {
+void GcodeInterpreter::set_modes(const GcodeLine& line) {
   for (const auto& [group, code] : line.g) {
     switch (group) {
       case Group::motion:
@@ -128,7 +119,7 @@ void GcodeInterpreter::set_modes(const Line& line) {
   enter_frame();
 }
 
-void GcodeInterpreter::set_tool_length(const Line& line, int code) {
+void GcodeInterpreter::set_tool_length(const GcodeLine& line, int code) {
   if (code == 490) {
     if (line.has('H')) fail("H together with G49");
     modal_.length = Modal::Length::none;
@@ -139,7 +130,7 @@ void GcodeInterpreter::set_tool_length(const Line& line, int code) {
   if (modal_.length == Modal::Length::rtcp)
     fail(fmt::format("{} while G43.4 is active; cancel with G49 first", name));
   if (!line.has('H')) fail(fmt::format("{} without H", name));
-  const int h = code_number(line.value('H'), 1);
+  const int h = whole_number(line.value('H'));
   try {
     modal_.tool_length = machine_.tool_length(h);
   } catch (const std::out_of_range&) {
@@ -163,7 +154,7 @@ void GcodeInterpreter::enter_frame() {
   position_ = map_.from_axes(q);
 }
 
-void GcodeInterpreter::set_feed(const Line& line) {
+void GcodeInterpreter::set_feed(const GcodeLine& line) {
   if (!line.has('F')) {
     // Inverse time holds for one block only.
     if (modal_.inverse_time) modal_.linear_feed = modal_.rotary_feed = 0;
@@ -175,7 +166,7 @@ void GcodeInterpreter::set_feed(const Line& line) {
   modal_.rotary_feed = modal_.inverse_time ? f / 60 : f * kDegree / 60;
 }
 
-void GcodeInterpreter::set_spindle(const Line& line) {
+void GcodeInterpreter::set_spindle(const GcodeLine& line) {
   if (line.has('S')) {
     const double rpm = line.value('S');
     modal_.spindle_speed = rpm * unit::rpm.to_si;

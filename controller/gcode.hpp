@@ -25,12 +25,9 @@
 #include <deque>
 #include <optional>
 #include <string>
-#include <variant>
-#include <vector>
 
-#include "controller/gcode_words.hpp"
-#include "model/geometry/kinematics.hpp"
-#include "model/machine.hpp"
+#include "controller/gcode_blocks.hpp"
+#include "controller/gcode_line.hpp"
 
 namespace vcnc {
 
@@ -58,18 +55,16 @@ class GcodeInterpreter {
     double linear_feed = 0, rotary_feed = 0;  ///< [m/s], [rad/s]; 0: no F yet
     double spindle_speed = 0;                 ///< [rad/s]
   };
-  struct Line;  ///< the words of one line, sorted
-
   void read_line(const std::string& text);
-  Line sort_words(const std::vector<Word>& words) const;
-  void set_modes(const Line& line);
-  void set_tool_length(const Line& line, int code);
-  void set_feed(const Line& line);
-  void set_spindle(const Line& line);
-  void emit_motion(const Line& line);
-  void emit_reference_return(const Line& line);
-  Coordinates target(const Line& line, bool machine_coordinates) const;
-  Arc arc_to(const Line& line, const Coordinates& end) const;
+  void set_modes(const GcodeLine& line);
+  void set_tool_length(const GcodeLine& line, int code);
+  void set_feed(const GcodeLine& line);
+  void set_spindle(const GcodeLine& line);
+  void emit_motion(const GcodeLine& line);
+  void emit_reference_return(const GcodeLine& line);
+  Coordinates target(const GcodeLine& line, bool machine_coordinates) const;
+  Arc arc_to(const GcodeLine& line, const Coordinates& end) const;
+  void set_move_feed(Move& move) const;
   void emit_move(Move move);
   void enter_frame();  ///< re-expresses the position after a change of offset or length
   MotionFrame frame() const;

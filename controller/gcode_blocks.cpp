@@ -9,6 +9,13 @@ AxisVector as_axes(const Coordinates& x) { return {x[0], x[1], x[2], x[3], x[4]}
 
 }  // namespace
 
+Coordinates start_coordinates(const Machine& machine) {
+  Coordinates q;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    q[static_cast<Eigen::Index>(i)] = machine.axes[i].limits.start;
+  return q;
+}
+
 FrameMap::FrameMap(const KinematicsParams& params, const MotionFrame& frame) {
   if (frame.rtcp) kinematics_.emplace(params, frame.tool_length, frame.p_MW);
 }

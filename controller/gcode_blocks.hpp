@@ -13,6 +13,9 @@ namespace vcnc {
 /// (RTCP) or five axis positions [m, rad].
 using Coordinates = Eigen::Matrix<double, 5, 1>;
 
+/// Where the axes stand at switch-on, as axis positions.
+Coordinates start_coordinates(const Machine& machine);
+
 /// What the coordinates of a move mean.
 struct MotionFrame {
   bool rtcp = false;         ///< false: axis positions; the rest has no meaning then

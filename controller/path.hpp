@@ -19,7 +19,7 @@
 
 #include <vector>
 
-#include "controller/gcode.hpp"
+#include "controller/gcode_blocks.hpp"
 
 namespace vcnc {
 

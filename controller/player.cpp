@@ -18,12 +18,6 @@ constexpr std::size_t kLongestRun = 50'000;  ///< moves; a longer run stops once
 constexpr double kExactCorner = 1.0 * kDegree;
 constexpr double kOrientSeconds = 0.2;  ///< from a standing spindle into its M19 position
 
-AxisVector start_position(const Machine& machine) {
-  AxisVector q;
-  for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = machine.axes[i].limits.start;
-  return q;
-}
-
 /// Throws where a position leaves the travel of an axis.
 void check_travel(const Coordinates& q, const Machine& machine, const std::string& where) {
   constexpr double kRounding = 1e-9;
@@ -78,7 +72,7 @@ bool continues(const Move& a, const Move& b) {
 struct Player::State {
   State(const std::string& file, const Machine& the_machine)
       : machine(the_machine), program(file, the_machine) {
-    step.position = start_position(machine);
+    for (std::size_t i = 0; i < kAxisCount; ++i) step.position[i] = machine.axes[i].limits.start;
   }
 
   const Machine machine;

@@ -396,9 +396,9 @@ struct Machine {
   static void fields(Self& p, Visit& visit) {
     visit("name", p.name, "shown in reports");
     visit.group("kinematics", p.kinematics, "how the rotary axes are carried");
-    visit.section("axes", "the five axes", [&](auto& axes) {
+    visit.section("axes", "the five axes", [&](auto& table) {
       for (std::size_t i = 0; i < kAxisCount; ++i)
-        axes.group(kAxisNames[i], p.axes[i], "one axis", is_rotary(i));
+        table.group(kAxisNames[i], p.axes[i], "one axis", is_rotary(i));
     });
     visit.group("spindle", p.spindle, "spindle drive");
     visit.group("probe", p.probe, "scanning probe and acquisition module");

@@ -3,6 +3,7 @@
 namespace vcnc {
 
 static_assert(kLoopStepsPerCycle == std::tuple_size_v<decltype(AxisCycle::truth)>);
+static_assert(kDriveLoopSteps == kLoopStepsPerCycle && kDriveLoopSteps * kPlantStepsPerLoop == kPlantStepsPerCycle);
 
 DriveNode::DriveNode(std::size_t axis, const Machine& machine, TruthPort& truth)
     : axis_(axis),

@@ -16,8 +16,8 @@
 namespace vcnc {
 namespace {
 
-constexpr std::size_t kWakeRows = 20;   ///< rows that are worth a message
-constexpr std::size_t kMostRows = 100;  ///< rows in one message
+constexpr std::size_t kWakeRows = 20;                     ///< rows that are worth a message
+constexpr std::size_t kMostRows = 100;                    ///< rows in one message
 constexpr auto kPatience = std::chrono::milliseconds(2);  ///< with fewer rows than that
 constexpr int kSliceMs = 20;
 
@@ -127,7 +127,7 @@ void DdsPublisher::wait_for_subscriber(int timeout_ms) {
     if (waited_ms >= timeout_ms)
       throw DdsError("no analysis has subscribed to the telemetry within " +
                      std::to_string(timeout_ms) + " ms");
-    // Matching has no data to wake up for, so the wait is cut into slices 
+    // Matching has no data to wake up for, so the wait is cut into slices
     check(dds_waitset_wait(s.waitset.get(), nullptr, 0, DDS_MSECS(kSliceMs)), "waiting");
   }
 }
@@ -154,9 +154,8 @@ void DdsPublisher::row(const TelemetryRow& row) {
     std::unique_lock lock(s.mutex);
     const std::uint64_t seq = s.next_seq++;
     if (!s.options.paced)
-      s.drained.wait(lock, [&] {
-        return s.count < s.ring.size() || s.stopping || !s.failure.empty();
-      });
+      s.drained.wait(lock,
+                     [&] { return s.count < s.ring.size() || s.stopping || !s.failure.empty(); });
     if (s.count == s.ring.size() || !s.failure.empty()) {
       ++s.dropped;
       return;
@@ -240,7 +239,8 @@ void DdsPublisher::State::publish_pending(std::unique_lock<std::mutex>& lock) {
     due.push_back(std::move(pending_alarms.front()));
     pending_alarms.erase(pending_alarms.begin());
   }
-  const std::uint64_t stop = pending_alarms.empty() ? ~std::uint64_t{0} : pending_alarms.front().at_seq;
+  const std::uint64_t stop =
+      pending_alarms.empty() ? ~std::uint64_t{0} : pending_alarms.front().at_seq;
   batch.clear();
   std::uint64_t seq = first;
   while (count > 0 && batch.size() < kMostRows * kRowWidth && ring[head].seq == seq && seq < stop) {

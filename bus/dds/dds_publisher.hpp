@@ -17,7 +17,7 @@ namespace vcnc {
 struct DdsPublisherOptions {
   bool paced = false;
   std::size_t buffer_rows = 16384;
-  std::size_t window_rows = 65536;   ///< free-running: how far a subscriber may be behind
+  std::size_t window_rows = 65536;    ///< free-running: how far a subscriber may be behind
   std::shared_ptr<DdsDomain> domain;  ///< null: one of its own
 };
 

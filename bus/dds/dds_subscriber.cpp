@@ -20,7 +20,7 @@ namespace vcnc {
 namespace {
 
 constexpr int kSliceMs = 50;
-constexpr int kLateSlices = 20;              ///< patience with what should be on its way: 1 s
+constexpr int kLateSlices = 20;               ///< patience with what should be on its way: 1 s
 constexpr std::uint64_t kReportEvery = 2000;  ///< rows between two progress messages
 
 using dds::check;
@@ -47,7 +47,9 @@ struct DdsSubscriber::State {
 
   void run();
   void follow();
-  void wait() { check(dds_waitset_wait(waitset.get(), nullptr, 0, DDS_MSECS(kSliceMs)), "waiting"); }
+  void wait() {
+    check(dds_waitset_wait(waitset.get(), nullptr, 0, DDS_MSECS(kSliceMs)), "waiting");
+  }
   void announce();
   void report(const dds::Guid& to);
   bool take_begin();
@@ -225,9 +227,10 @@ bool DdsSubscriber::State::take_rows() {
 
 void DdsSubscriber::State::deliver_rows(const vcnc_dds_Rows& batch) {
   if (batch.width != kRowWidth || batch.values._length % kRowWidth != 0)
-    throw DdsError(fmt::format("DDS: rows of {} numbers arrive, this program knows {}: the NC unit is of "
-                               "another version",
-                               batch.width, kRowWidth));
+    throw DdsError(
+        fmt::format("DDS: rows of {} numbers arrive, this program knows {}: the NC unit is of "
+                    "another version",
+                    batch.width, kRowWidth));
   // Alarms travel on their own; those before these rows are on their way.
   for (int slices = 0; next_alarm + pending_alarms.size() < batch.alarms && slices < kLateSlices;) {
     take_alarms();

@@ -81,10 +81,10 @@ inline Qos progress_qos() {
 
 template <class T>
 struct TopicOf;
-#define VCNC_DDS_TOPIC(Type)                                                     \
-  template <>                                                                    \
-  struct TopicOf<vcnc_dds_##Type> {                                              \
-    static constexpr const char* kName = "vcnc_" #Type;                          \
+#define VCNC_DDS_TOPIC(Type)                                                        \
+  template <>                                                                       \
+  struct TopicOf<vcnc_dds_##Type> {                                                 \
+    static constexpr const char* kName = "vcnc_" #Type;                             \
     static const dds_topic_descriptor_t* type() { return &vcnc_dds_##Type##_desc; } \
   }
 VCNC_DDS_TOPIC(Rows);
@@ -96,9 +96,9 @@ VCNC_DDS_TOPIC(Progress);
 
 template <class T>
 Entity topic(const Entity& participant) {
-  return {dds_create_topic(participant.get(), TopicOf<T>::type(), TopicOf<T>::kName, nullptr,
-                           nullptr),
-          TopicOf<T>::kName};
+  return {
+      dds_create_topic(participant.get(), TopicOf<T>::type(), TopicOf<T>::kName, nullptr, nullptr),
+      TopicOf<T>::kName};
 }
 
 template <class T>
@@ -136,8 +136,9 @@ class Reader {
     constexpr std::size_t kMost = 64;
     std::array<void*, kMost> samples{};
     std::array<dds_sample_info_t, kMost> infos;
-    Loan loan{reader_.get(), samples.data(),
-              check(dds_take(reader_.get(), samples.data(), infos.data(), kMost, kMost), "reading")};
+    Loan loan{
+        reader_.get(), samples.data(),
+        check(dds_take(reader_.get(), samples.data(), infos.data(), kMost, kMost), "reading")};
     const auto n = static_cast<std::size_t>(loan.count);
     for (std::size_t i = 0; i < n; ++i)
       f(infos[i].valid_data ? static_cast<const T*>(samples[i]) : nullptr, infos[i]);

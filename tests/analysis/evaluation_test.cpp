@@ -46,9 +46,10 @@ TEST(Evaluation, SPieceHasThreeCrossingsOnEachSide) {
   const auto path = run.piece().scan_path(3e-3, 0.5e-3, 20e-3, 0.2e-3);
   const std::array<double, 6> expected{0.1160, 0.5098, 0.8898, 0.8898, 0.5098, 0.1160};
   for (std::size_t i = 0; i < 6; ++i) {
-    const auto near = std::min_element(path.begin(), path.end(), [&](const Station& a, const Station& b) {
-      return std::abs(a.s - s.crossings[i].s) < std::abs(b.s - s.crossings[i].s);
-    });
+    const auto near =
+        std::min_element(path.begin(), path.end(), [&](const Station& a, const Station& b) {
+          return std::abs(a.s - s.crossings[i].s) < std::abs(b.s - s.crossings[i].s);
+        });
     foot = run.piece().nearest(near->centre, SurfacePoint());
     EXPECT_NEAR(foot.u, expected[i], 2e-3) << s.crossings[i].name;
   }
@@ -68,9 +69,8 @@ TEST(Evaluation, ShiftOfTheTipAlongTheNormalIsEnWithItsSign) {
 
 TEST(Evaluation, ToleranceOnARunOfSamplesFails) {
   SyntheticRun run(synthetic::machine(), synthetic::piece_params("s_eq1"));
-  run.lap(20e-3, 0.1e-3, [](const Station& st) {
-    return Vec3((st.s > 0.2 && st.s < 0.201 ? 60e-6 : 0) * st.n);
-  });
+  run.lap(20e-3, 0.1e-3,
+          [](const Station& st) { return Vec3((st.s > 0.2 && st.s < 0.201 ? 60e-6 : 0) * st.n); });
   const Summary s = evaluate(run);
   EXPECT_EQ(s.verdict, Verdict::fail);
   EXPECT_NEAR(s.groups.front().e_n.at_max, 0.2, 1.1e-3);
@@ -175,11 +175,44 @@ TEST(Evaluation, RunWithoutPieceStillEvaluatesTheAxes) {
   EXPECT_EQ(s.verdict, Verdict::incomplete);
 }
 
+// Half circles from and to the centre touch the lap tangentially, 45 deg before and after it: they
+// come as near to the scan distance as one likes, but do not count.
+TEST(Evaluation, TangentialEntryAndExitAreNoError) {
+  SyntheticRun run(synthetic::machine(), synthetic::piece_params("ring"));
+  constexpr double kR = 100e-3, kStep = 0.05e-3;
+  const auto move = [&](const Vec3& p) {
+    const AxisVector q = run.axes(p, Vec3::UnitZ());
+    run.add(q, q, Vec3::Zero());
+  };
+  const auto arc = [&](const Vec3& centre, double radius, double from, double to) {
+    const int n = static_cast<int>((to - from) * radius / kStep);
+    for (int i = 1; i <= n; ++i) {
+      const double phi = from + (to - from) * i / n;
+      move(centre + radius * Vec3(std::cos(phi), std::sin(phi), 0));
+    }
+  };
+  const double in = -kPi / 4, out = 2 * kPi + kPi / 4;
+  move(Vec3::Zero());
+  arc(kR / 2 * Vec3(std::cos(in), std::sin(in), 0), kR / 2, in - kPi, in);
+  arc(Vec3::Zero(), kR, in, out);
+  arc(kR / 2 * Vec3(std::cos(out), std::sin(out), 0), kR / 2, out, out + kPi);
+  const Summary s = evaluate(run);
+  EXPECT_EQ(s.coverage_percent, 100.0);
+  EXPECT_EQ(s.verdict, Verdict::pass) << s.verdict_reason;
+  EXPECT_LT(s.groups.front().e_plan.max_abs(), 3.1e-6);
+  EXPECT_LT(s.groups.front().e_plan.rms(), 0.1e-6);
+  EXPECT_LT(s.groups.front().e_rest.max_abs(), 1e-9);
+  ASSERT_EQ(s.circles.size(), 1u);
+  EXPECT_LT(s.circles[0].result.G, 3.2e-6);
+}
+
 // A ring that is found 3 um too small in radius everywhere, both senses.
 TEST(Evaluation, RingRadiusErrorIsFoundInBothSenses) {
   SyntheticRun run(synthetic::machine(), synthetic::piece_params("ring"));
   const auto path = run.piece().scan_path(3e-3, 0.5e-3, 0, 0.1e-3);
-  const auto shrink = [](const Station& st) { return Vec3(3e-6 * st.n); };  // n points to the centre
+  const auto shrink = [](const Station& st) {
+    return Vec3(3e-6 * st.n);
+  };  // n points to the centre
   for (const Station& st : path) run.normal_offset(st, 0, shrink);
   for (auto st = path.rbegin(); st != path.rend(); ++st) run.normal_offset(*st, 0, shrink);
   const Summary s = evaluate(run);

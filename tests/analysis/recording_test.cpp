@@ -28,7 +28,8 @@ bool same_bits(const TelemetryRow& a, const TelemetryRow& b) {
   return std::memcmp(&a, &b, sizeof(a)) == 0;
 }
 
-const RunBegin kBegin{"run-42", "part.nc", "name = \"m\"\n", "name = \"p\"\n", 18446744073709551615u};
+const RunBegin kBegin{"run-42", "part.nc", "name = \"m\"\n", "name = \"p\"\n",
+                      18446744073709551615u};
 
 RunEnd complete_end() {
   RunEnd end{true, "program end", 2500, "ab12", 1.25, 0.8125, 3};

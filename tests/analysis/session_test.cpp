@@ -115,7 +115,8 @@ TEST(AnalysisSession, TextNamesVerdictAndFigures) {
   play(run, run.rows(), session);
   const std::string text = to_text(*session.summary());
   EXPECT_EQ(text.substr(0, 6), "PASS  ");
-  for (const char* part : {"e_n", "e_servo", "coverage 100.0 %", "following error", "drive Y", "trace"})
+  for (const char* part :
+       {"e_n", "e_servo", "coverage 100.0 %", "following error", "drive Y", "trace"})
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
 }
 

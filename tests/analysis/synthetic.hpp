@@ -45,7 +45,8 @@ class SyntheticRun {
   using TipError = std::function<Vec3(const Station&)>;
 
   SyntheticRun(Machine m, const PieceParams& p)
-      : machine_(std::move(m)), piece_(make_piece(p)),
+      : machine_(std::move(m)),
+        piece_(make_piece(p)),
         kinematics_(machine_.kinematics, machine_.tool_length(1), machine_.setup.work_offset[0]) {}
 
   const Machine& machine() const { return machine_; }

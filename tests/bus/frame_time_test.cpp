@@ -91,19 +91,25 @@ Frame random_frame(toy::Random& random, bool fd) {
   for (int i = 0; i < frame.len; ++i) {
     const auto byte = static_cast<std::uint8_t>(random.next());
     constexpr std::uint8_t kRuns[8] = {0x00, 0xff, 0x0f, 0xf0, 0x1f, 0xe0, 0x78, 0x87};
-    frame.data[static_cast<std::size_t>(i)] =
-        kind == 0 ? byte : kind == 1 ? 0 : kind == 2 ? kRuns[byte % 8] : kRuns[byte % 2];
+    frame.data[static_cast<std::size_t>(i)] = kind == 0   ? byte
+                                              : kind == 1 ? 0
+                                              : kind == 2 ? kRuns[byte % 8]
+                                                          : kRuns[byte % 2];
   }
   return frame;
 }
 
 TEST(FrameTime, WorstCasesOfTheFdTable) {
-  const std::vector<std::pair<int, int>> us_at_1_5{{0, 39}, {8, 55}, {16, 71}, {32, 104}, {48, 136}, {64, 168}};
+  const std::vector<std::pair<int, int>> us_at_1_5{{0, 39},   {8, 55},   {16, 71},
+                                                   {32, 104}, {48, 136}, {64, 168}};
   for (const auto& [len, us] : us_at_1_5)
-    EXPECT_EQ(std::llround(static_cast<double>(worst_duration_ns(len, true, k1And5)) / 1000), us) << len;
-  const std::vector<std::pair<int, int>> us_at_1_8{{0, 36}, {8, 46}, {16, 56}, {32, 77}, {48, 97}, {64, 117}};
+    EXPECT_EQ(std::llround(static_cast<double>(worst_duration_ns(len, true, k1And5)) / 1000), us)
+        << len;
+  const std::vector<std::pair<int, int>> us_at_1_8{{0, 36},  {8, 46},  {16, 56},
+                                                   {32, 77}, {48, 97}, {64, 117}};
   for (const auto& [len, us] : us_at_1_8)
-    EXPECT_EQ(std::llround(static_cast<double>(worst_duration_ns(len, true, k1And8)) / 1000), us) << len;
+    EXPECT_EQ(std::llround(static_cast<double>(worst_duration_ns(len, true, k1And8)) / 1000), us)
+        << len;
 }
 
 TEST(FrameTime, ClassicalFramesOfEightBytesTakeAtMost135Bits) {

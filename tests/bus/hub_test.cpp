@@ -109,10 +109,11 @@ TEST(Hub, ProcessesInAnyOrderWithDelaysGiveTheHashOfOneProcess) {
     // Forked before the hub's thread exists: a child of a threaded process may only exec.
     std::vector<toy::ChildProcess> children;
     for (const int id : permuted(seed))
-      children.push_back(node_process("hub://" + dir.file("bus"), id, seed == 1 ? 0 : seed * 10 + static_cast<std::uint64_t>(id)));
+      children.push_back(node_process("hub://" + dir.file("bus"), id,
+                                      seed == 1 ? 0 : seed * 10 + static_cast<std::uint64_t>(id)));
     Hub hub(dir.file("bus"));
     const auto result = run_master(hub.uri(), kCycles, seed == 3 ? 4.0 : 0.0);
-    EXPECT_TRUE(result.complete) << result.failure;
+    ASSERT_TRUE(result.complete) << result.failure;
     EXPECT_EQ(result.trace_hash, expected);
     for (auto& child : children) EXPECT_EQ(child.wait(), 0);
   }
@@ -240,7 +241,8 @@ TEST(Hub, AnswersReachTheOtherNodesWithTheNextSync) {
   toy::SocketDir dir;
   Hub hub(dir.file("bus"));
   HubTransport a(dir.file("bus"), 1), b(dir.file("bus"), 2), master(dir.file("bus"), 0);
-  const Frame sync = encode(Sync{1}), from_a = encode(DriveStatus{.node = 1}), from_b = encode(DriveStatus{.node = 2});
+  const Frame sync = encode(Sync{1}), from_a = encode(DriveStatus{.node = 1}),
+              from_b = encode(DriveStatus{.node = 2});
   Frames frames;
   master.send({&sync, 1});
   a.send({&from_a, 1});
@@ -265,7 +267,8 @@ TEST(Hub, TapSeesEverything) {
   Hub hub(dir.file("bus"));
   HubTransport tap(dir.file("bus"), kTapId), node(dir.file("bus"), 1), master(dir.file("bus"), 0);
   for (int i = 0; i < 100; ++i) {
-    const Frame sync = encode(Sync{static_cast<std::uint8_t>(i + 1)}), answer = encode(DriveStatus{.node = 1});
+    const Frame sync = encode(Sync{static_cast<std::uint8_t>(i + 1)}),
+                answer = encode(DriveStatus{.node = 1});
     Frames heard, answers, seen;
     master.send({&sync, 1});
     ASSERT_EQ(node.receive(heard, 5000), Transport::Received::frames);
@@ -286,7 +289,8 @@ TEST(Hub, EndOfTheMasterClosesTheNodes) {
   master->send({&nmt, 1});
   master.reset();
   Frames frames;
-  ASSERT_EQ(node.receive(frames, 5000), Transport::Received::frames);  // what was said still arrives
+  ASSERT_EQ(node.receive(frames, 5000),
+            Transport::Received::frames);  // what was said still arrives
   EXPECT_EQ(frames, Frames{nmt});
   EXPECT_EQ(node.receive(frames, 5000), Transport::Received::closed);
   EXPECT_NO_THROW(node.send(frames));
@@ -302,14 +306,19 @@ TEST(Hub, ErrorsAreClear) {
     }
     return "no error";
   };
-  EXPECT_NE(message([&] { HubTransport(dir.file("bus"), 1); }).find("is the machine running?"), std::string::npos);
+  EXPECT_NE(message([&] { HubTransport(dir.file("bus"), 1); }).find("is the machine running?"),
+            std::string::npos);
   EXPECT_NE(message([&] { Hub("/nowhere/at/all"); }).find("No such file"), std::string::npos);
-  EXPECT_NE(message([&] { Hub(std::string(300, 'x')); }).find("1 to 107 characters"), std::string::npos);
+  EXPECT_NE(message([&] { Hub(std::string(300, 'x')); }).find("1 to 107 characters"),
+            std::string::npos);
   Hub hub(dir.file("bus"));
   EXPECT_NE(message([&] { Hub(dir.file("bus")); }).find("in use"), std::string::npos);
   HubTransport first(dir.file("bus"), 3);
-  EXPECT_NE(message([&] { HubTransport(dir.file("bus"), 3); }).find("node id 3 is already on the bus"), std::string::npos);
-  EXPECT_NE(message([&] { HubTransport(dir.file("bus"), 200); }).find("0..127 and 255"), std::string::npos);
+  EXPECT_NE(
+      message([&] { HubTransport(dir.file("bus"), 3); }).find("node id 3 is already on the bus"),
+      std::string::npos);
+  EXPECT_NE(message([&] { HubTransport(dir.file("bus"), 200); }).find("0..127 and 255"),
+            std::string::npos);
   HubTransport tap(dir.file("bus"), kTapId), second_tap(dir.file("bus"), kTapId);
   EXPECT_NE(message([&] { tap.send({}); }).find("cannot send"), std::string::npos);
 }

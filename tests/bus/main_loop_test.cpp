@@ -38,11 +38,13 @@ TEST(MainLoop, RunsTheCyclesInOrderAndLogsThem) {
   double worst = 0;
   for (std::size_t k = 0; k < log.cycles.size(); ++k) {
     const Frames& frames = log.cycles[k];
-    EXPECT_TRUE(std::is_sorted(frames.begin(), frames.end(), [](auto& a, auto& b) { return a.id < b.id; }));
+    EXPECT_TRUE(
+        std::is_sorted(frames.begin(), frames.end(), [](auto& a, auto& b) { return a.id < b.id; }));
     EXPECT_EQ(frames.front(), encode(Sync{sync_counter(static_cast<Tick>(k))}));
     EXPECT_EQ(frames.back().id, kCommandId);
     for (std::uint16_t id = 0x181; id <= 0x183; ++id)
-      EXPECT_EQ(std::count_if(frames.begin(), frames.end(), [id](auto& f) { return f.id == id; }), 1);
+      EXPECT_EQ(std::count_if(frames.begin(), frames.end(), [id](auto& f) { return f.id == id; }),
+                1);
     hash.add(static_cast<Tick>(k), frames);
     worst = std::max(worst, bus_load(frames, {}));
   }
@@ -73,7 +75,8 @@ TEST(MainLoop, OrderOfTheNodesInOneProcessDoesNotMatter) {
   toy::Random random(12);
   for (int run = 0; run < 10; ++run) {
     auto nodes = toy::make_nodes(6);
-    for (std::size_t i = nodes.size(); i > 1; --i) std::swap(nodes[i - 1], nodes[random.next() % i]);
+    for (std::size_t i = nodes.size(); i > 1; --i)
+      std::swap(nodes[i - 1], nodes[random.next() % i]);
     InprocTransport bus(toy::pointers(nodes));
     toy::ToyMaster master(200);
     Pacer pacer;
@@ -105,7 +108,8 @@ TEST(MainLoop, NodeThatIsNotThereIsNamedAtTheStart) {
   InprocTransport bus(toy::pointers(nodes));
   toy::ToyMaster master(10);
   Pacer pacer;
-  const auto result = run_main_loop(master, bus, {{1, "drive X"}, {5, "drive C"}, {7, "probe"}}, {.pacer = pacer});
+  const auto result =
+      run_main_loop(master, bus, {{1, "drive X"}, {5, "drive C"}, {7, "probe"}}, {.pacer = pacer});
   EXPECT_FALSE(result.complete);
   EXPECT_EQ(result.failure, "not on the bus within 15 s: drive C, probe");
   EXPECT_EQ(result.cycles, 0);
@@ -120,7 +124,9 @@ class Meddler : public Transport {
     const std::size_t known = into.size();
     const Received received = bus_.receive(into, timeout_ms);
     if (meddle && into.size() > known && ++calls > 20) meddle(into);
-    return into.size() > known ? Received::frames : received == Received::closed ? received : Received::timeout;
+    return into.size() > known            ? Received::frames
+           : received == Received::closed ? received
+                                          : Received::timeout;
   }
   std::uint64_t lost() const override { return lost_; }
   std::function<void(Frames&)> meddle;
@@ -146,7 +152,9 @@ struct MeddledRun {
 
 TEST(MainLoop, SilentNodeIsNamed) {
   MeddledRun r;
-  r.bus.meddle = [](Frames& frames) { std::erase_if(frames, [](const Frame& f) { return f.id == 0x182; }); };
+  r.bus.meddle = [](Frames& frames) {
+    std::erase_if(frames, [](const Frame& f) { return f.id == 0x182; });
+  };
   const auto result = r.run();
   EXPECT_FALSE(result.complete);
   EXPECT_TRUE(result.failure.starts_with("no answer within 250 ms in cycle ")) << result.failure;

@@ -38,12 +38,12 @@ TEST(Messages, GoldenBytesOfGroupCommand) {
   GroupCommand m;
   m.tick = 0x1234;
   m.controlword = 0x000f;
-  m.axes[0] = {0.1, -0.02};       // 1e9 counts, -2e6 counts
-  m.axes[1] = {-1e-10, 1e-8};     // -1, 1
-  m.axes[4] = {0, 21.47483647};   // the largest velocity
+  m.axes[0] = {0.1, -0.02};      // 1e9 counts, -2e6 counts
+  m.axes[1] = {-1e-10, 1e-8};    // -1, 1
+  m.axes[4] = {0, 21.47483647};  // the largest velocity
   m.spindle_mode = GroupCommand::SpindleMode::orient;
   m.flags = kResetLatch;
-  m.spindle_speed = -1;           // -1e5
+  m.spindle_speed = -1;  // -1e5
   const Frame frame = encode(m);
   EXPECT_EQ(frame.id, 0x200);
   EXPECT_TRUE(frame.fd);
@@ -62,21 +62,23 @@ TEST(Messages, GoldenBytesOfGroupCommand) {
 TEST(Messages, GoldenBytesOfAnswers) {
   const Frame axis = encode(DriveStatus{2, 0xabcd, 0x1237, 0.0256, -1e-6, 0.5});
   EXPECT_EQ(axis.id, 0x182);
-  EXPECT_EQ(bytes_of(axis), (Bytes{0xcd, 0xab, 0x37, 0x12, 0x00, 0x40, 0x42, 0x0f, 0x00, 0x00,
-                                   0xf0, 0xd8, 0xff, 0xff, 0x88, 0x13}));
+  EXPECT_EQ(bytes_of(axis), (Bytes{0xcd, 0xab, 0x37, 0x12, 0x00, 0x40, 0x42, 0x0f, 0x00, 0x00, 0xf0,
+                                   0xd8, 0xff, 0xff, 0x88, 0x13}));
   // The spindle's second value is a speed, in 1e-5 rad/s.
   const Frame spindle = encode(DriveStatus{kSpindleNode, 1, 2, 1e-10, 100.0, -1});
   EXPECT_EQ(spindle.id, 0x186);
-  EXPECT_EQ(bytes_of(spindle), (Bytes{1, 0, 2, 0, 1, 0, 0, 0, 0, 0, 0x80, 0x96, 0x98, 0x00, 0xf0, 0xd8}));
+  EXPECT_EQ(bytes_of(spindle),
+            (Bytes{1, 0, 2, 0, 1, 0, 0, 0, 0, 0, 0x80, 0x96, 0x98, 0x00, 0xf0, 0xd8}));
 
-  const Frame probe = encode(ProbeSample{7, ProbeSample::kSlip, {1e-10, -1e-10, 0.018}, {1, 2, 3, 4, 5, 65535}});
+  const Frame probe =
+      encode(ProbeSample{7, ProbeSample::kSlip, {1e-10, -1e-10, 0.018}, {1, 2, 3, 4, 5, 65535}});
   EXPECT_EQ(probe.id, 0x187);
   EXPECT_EQ(bytes_of(probe),
-            (Bytes{7,    0,    4,    0,    1, 0, 0, 0, 0xff, 0xff, 0xff, 0xff, 0x00, 0x95, 0xba, 0x0a,
-                   1,    0,    2,    0,    3, 0, 4, 0, 5,    0,    0xff, 0xff, 0,    0,    0,    0}));
+            (Bytes{7, 0, 4, 0, 1, 0, 0, 0, 0xff, 0xff, 0xff, 0xff, 0x00, 0x95, 0xba, 0x0a,
+                   1, 0, 2, 0, 3, 0, 4, 0, 5,    0,    0xff, 0xff, 0,    0,    0,    0}));
 
-  const Frame overtravel = encode(OvertravelState{
-      258, OvertravelState::State::tripped, OvertravelState::Cause::signal, 1e-4});
+  const Frame overtravel = encode(
+      OvertravelState{258, OvertravelState::State::tripped, OvertravelState::Cause::signal, 1e-4});
   EXPECT_EQ(overtravel.id, 0x188);
   EXPECT_EQ(bytes_of(overtravel), (Bytes{2, 1, 2, 3, 0x40, 0x42, 0x0f, 0}));
 }
@@ -90,7 +92,8 @@ struct Codec {
 };
 
 template <class M>
-std::function<std::optional<Frame>(const Frame&)> reencoder(std::optional<M> (*decode)(const Frame&)) {
+std::function<std::optional<Frame>(const Frame&)> reencoder(
+    std::optional<M> (*decode)(const Frame&)) {
   return [decode](const Frame& frame) -> std::optional<Frame> {
     const auto message = decode(frame);
     return message ? std::optional(encode(*message)) : std::nullopt;
@@ -116,17 +119,20 @@ std::vector<Codec> codecs() {
                            byte(r)});
        },
        reencoder(decode_nmt)},
-      {"sync", [](toy::Random& r) { return encode(Sync{static_cast<std::uint8_t>(1 + r.next() % 240)}); },
+      {"sync",
+       [](toy::Random& r) { return encode(Sync{static_cast<std::uint8_t>(1 + r.next() % 240)}); },
        reencoder(decode_sync)},
       {"heartbeat",
        [](toy::Random& r) {
-         return encode(Heartbeat{node(r, 127), pick(r, {NmtState::boot_up, NmtState::stopped, NmtState::operational,
-                                                        NmtState::pre_operational})});
+         return encode(
+             Heartbeat{node(r, 127), pick(r, {NmtState::boot_up, NmtState::stopped,
+                                              NmtState::operational, NmtState::pre_operational})});
        },
        reencoder(decode_heartbeat)},
       {"emergency",
        [](toy::Random& r) {
-         return encode(Emergency{node(r, 127), word(r), byte(r), {byte(r), byte(r), byte(r), byte(r), byte(r)}});
+         return encode(Emergency{
+             node(r, 127), word(r), byte(r), {byte(r), byte(r), byte(r), byte(r), byte(r)}});
        },
        reencoder(decode_emergency)},
       {"group command",
@@ -143,19 +149,23 @@ std::vector<Codec> codecs() {
        reencoder(decode_group_command)},
       {"drive status",
        [](toy::Random& r) {
-         return encode(DriveStatus{node(r, 6), word(r), word(r), r.unit() * 10, r.unit() * 0.2, r.unit() * 3.2});
+         return encode(DriveStatus{node(r, 6), word(r), word(r), r.unit() * 10, r.unit() * 0.2,
+                                   r.unit() * 3.2});
        },
        reencoder(decode_drive_status)},
       {"probe sample",
        [](toy::Random& r) {
-         return encode(ProbeSample{word(r), word(r), {r.unit() * 0.02, r.unit() * 0.02, r.unit() * 0.005},
+         return encode(ProbeSample{word(r),
+                                   word(r),
+                                   {r.unit() * 0.02, r.unit() * 0.02, r.unit() * 0.005},
                                    {word(r), word(r), word(r), word(r), word(r), word(r)}});
        },
        reencoder(decode_probe_sample)},
       {"overtravel state",
        [](toy::Random& r) {
          return encode(OvertravelState{word(r), static_cast<OvertravelState::State>(byte(r, 3)),
-                                       static_cast<OvertravelState::Cause>(byte(r, 5)), r.unit() * 0.02});
+                                       static_cast<OvertravelState::Cause>(byte(r, 5)),
+                                       r.unit() * 0.02});
        },
        reencoder(decode_overtravel_state)},
   };
@@ -233,7 +243,8 @@ TEST(MessagesContract, NotANumberStaysVisible) {
   EXPECT_TRUE(std::isnan(status->position));
   EXPECT_DOUBLE_EQ(status->second_encoder, 0.1);
   EXPECT_TRUE(std::isnan(status->force));
-  EXPECT_TRUE(std::isnan(decode_overtravel_state(encode(OvertravelState{.deflection = kNan}))->deflection));
+  EXPECT_TRUE(
+      std::isnan(decode_overtravel_state(encode(OvertravelState{.deflection = kNan}))->deflection));
 }
 
 TEST(MessagesContract, SaturatesSymmetrically) {

@@ -60,11 +60,13 @@ struct Rig {
 TEST(NodeShell, StartUpFollowsNetworkManagement) {
   Rig rig;
   EXPECT_TRUE(rig.sync(0).empty());  // not started: no answer, no step
-  EXPECT_EQ(rig.feed(encode(Nmt{NmtCommand::reset_node, 0})), Frames{encode(Heartbeat{3, NmtState::boot_up})});
+  EXPECT_EQ(rig.feed(encode(Nmt{NmtCommand::reset_node, 0})),
+            Frames{encode(Heartbeat{3, NmtState::boot_up})});
   EXPECT_EQ(rig.shell.state(), NmtState::pre_operational);
   EXPECT_TRUE(rig.feed(encode(Nmt{NmtCommand::start, 9})).empty());  // meant for another node
   EXPECT_EQ(rig.shell.state(), NmtState::pre_operational);
-  EXPECT_EQ(rig.feed(encode(Nmt{NmtCommand::start, 3})), Frames{encode(Heartbeat{3, NmtState::operational})});
+  EXPECT_EQ(rig.feed(encode(Nmt{NmtCommand::start, 3})),
+            Frames{encode(Heartbeat{3, NmtState::operational})});
   EXPECT_TRUE(rig.feed(encode(Nmt{NmtCommand::start, 3})).empty());  // is operational already
   EXPECT_EQ(rig.sync(0).size(), 1u);
   EXPECT_FALSE(rig.shell.over());
@@ -87,7 +89,8 @@ TEST(NodeShell, FramesOfACycleActInTheNextOneInOrderOfTheirIdentifiers) {
   rig.feed(frame_with(0x702));  // heartbeats stay in the shell
   EXPECT_TRUE(rig.node.heard.empty());
   rig.sync(1);
-  EXPECT_EQ(rig.node.heard, (Frames{frame_with(0x088, 3), frame_with(0x187, 2), frame_with(0x200, 1)}));
+  EXPECT_EQ(rig.node.heard,
+            (Frames{frame_with(0x088, 3), frame_with(0x187, 2), frame_with(0x200, 1)}));
   rig.sync(2);
   EXPECT_TRUE(rig.node.heard.empty());
 }
@@ -106,7 +109,8 @@ TEST(NodeShell, CyclicFrameLeavesLast) {
 TEST(NodeShell, TickIsUnwrappedFarBeyondTheCounter) {
   Rig rig;
   rig.start();
-  constexpr Tick kCycles = 2 * 65536 + 500;  // beyond both wraps: of the counter and of 16-bit ticks
+  constexpr Tick kCycles =
+      2 * 65536 + 500;  // beyond both wraps: of the counter and of 16-bit ticks
   for (Tick k = 0; k < kCycles; ++k) {
     const Frames out = rig.sync(k);
     ASSERT_EQ(out.size(), 1u);

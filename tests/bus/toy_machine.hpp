@@ -1,5 +1,5 @@
-// A small machine for tests of the bus: nodes whose answers depend on everything they have heard, so
-// that any frame that is missing, late or out of order changes the trace hash.
+// A small machine for tests of the bus: nodes whose answers depend on everything they have heard,
+// so that any frame that is missing, late or out of order changes the trace hash.
 #pragma once
 
 #include <signal.h>

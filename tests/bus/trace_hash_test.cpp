@@ -22,7 +22,8 @@ std::string hash_of(Tick k, const Frames& frames) {
 }
 
 TEST(TraceHash, EmptyIsTheHashOfNothing) {
-  EXPECT_EQ(TraceHash().hex(), "99aa06d3014798d86001c324468d497f");  // XXH3-128 of zero bytes, seed 0
+  EXPECT_EQ(TraceHash().hex(),
+            "99aa06d3014798d86001c324468d497f");  // XXH3-128 of zero bytes, seed 0
 }
 
 TEST(TraceHash, EveryPartOfAFrameCounts) {

@@ -16,7 +16,8 @@ namespace {
 TruthCycle cycle(Tick k, std::size_t axis) {
   TruthCycle c{.tick = k};
   for (std::size_t i = 0; i < c.position.size(); ++i)
-    c.position[i] = static_cast<double>(k) + 0.1 * static_cast<double>(axis) + 1e-12 * static_cast<double>(i);
+    c.position[i] =
+        static_cast<double>(k) + 0.1 * static_cast<double>(axis) + 1e-12 * static_cast<double>(i);
   return c;
 }
 

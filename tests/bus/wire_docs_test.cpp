@@ -3,8 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <map>
-#include <regex>
 #include <set>
+#include <sstream>
+#include <string>
 
 #include "bus/frame.hpp"
 
@@ -38,28 +39,36 @@ TEST(WireDocs, MarkdownNamesEveryField) {
     for (const WireField& f : m.fields)
       EXPECT_NE(page.find("| " + std::string(f.name) + " |"), std::string::npos) << f.name;
   }
-  EXPECT_NE(page.find("| 4 | i48 | x_position | 1e-10 | m | -14073.7..14073.7 |"), std::string::npos);
+  EXPECT_NE(page.find("| 4 | i48 | x_position | 1e-10 | m | -14073.7..14073.7 |"),
+            std::string::npos);
 }
 
 TEST(WireDocs, DbcHasEveryFrameOnceAndMarksFd) {
   const std::string text = dbc();
-  const std::regex message(R"re(BO_ (\d+) (\w+): (\d+) (\w+)\n)re");
   std::map<int, int> length_by_id;
   std::set<std::string> names;
-  for (std::sregex_iterator i(text.begin(), text.end(), message), end; i != end; ++i) {
-    EXPECT_TRUE(length_by_id.emplace(std::stoi((*i)[1]), std::stoi((*i)[3])).second);
-    EXPECT_TRUE(names.insert((*i)[2]).second) << (*i)[2];
+  std::set<int> fd_ids, fast_ids;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string keyword, name, object;
+    int id = -1, number = -1;
+    words >> keyword;
+    if (keyword == "BO_" && words >> id >> name >> number) {
+      EXPECT_TRUE(length_by_id.emplace(id, number).second) << line;
+      EXPECT_TRUE(names.insert(name).second) << line;
+    } else if (keyword == "BA_" && words >> name >> object >> id >> number) {
+      if (name == "\"VFrameFormat\"" && number == 14) fd_ids.insert(id);
+      if (name == "\"CANFD_BRS\"" && number == 1) fast_ids.insert(id);
+    }
   }
   EXPECT_EQ(length_by_id.size(), 2u + 8 + 6 + 2 + 1 + 8);
   EXPECT_EQ(length_by_id.at(0x200), 64);
   EXPECT_EQ(length_by_id.at(0x187), 32);
   EXPECT_EQ(length_by_id.at(0x085), 8);
 
-  const std::regex fd("BA_ \"VFrameFormat\" BO_ (\\d+) 14;\nBA_ \"CANFD_BRS\" BO_ \\1 1;");
-  std::set<int> fd_ids;
-  for (std::sregex_iterator i(text.begin(), text.end(), fd), end; i != end; ++i)
-    fd_ids.insert(std::stoi((*i)[1]));
   EXPECT_EQ(fd_ids, (std::set<int>{0x181, 0x182, 0x183, 0x184, 0x185, 0x186, 0x187, 0x188, 0x200}));
+  EXPECT_EQ(fast_ids, fd_ids);
   for (const char* attribute : {"BusType", "VFrameFormat", "CANFD_BRS"})
     EXPECT_NE(text.find("BA_DEF_DEF_ \"" + std::string(attribute) + "\""), std::string::npos);
   EXPECT_NE(text.find("SG_ x_position : 32|48@1- (1e-10,0) "), std::string::npos);

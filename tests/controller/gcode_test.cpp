@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
 #include <string>
 
 #include "controller/player.hpp"
@@ -302,6 +303,8 @@ const WrongProgram kWrong[] = {
     {"S100 M4\nM30", 1, "probe in spindle: only M19 is allowed"},
     {"S-1\nM30", 1, "S-1 is out of range"},
     {"S99999\nM30", 1, "allowed is 0 to 12000 rpm"},
+    {"G1 X0 F0.0001\nM30", 1, "the move would last"},
+    {"G93 G1 X0 F0.0001\nM30", 1, "the move would last"},
     // motion
     {"X1\nM30", 1, "axis words without G0, G1, G2 or G3"},
     {"G1 X1 I5 F100\nM30", 1, "I, J, K or R without G2 or G3"},
@@ -358,6 +361,28 @@ const WrongProgram kWrong[] = {
 };
 
 INSTANTIATE_TEST_SUITE_P(Gcode, RefusedProgram, testing::ValuesIn(kWrong));
+
+TEST(RefusedPrograms, RandomTextIsRefusedOrReadButNeverWorse) {
+  std::mt19937_64 random(5);
+  constexpr std::string_view kPieces[] = {
+      "G0",  "G1",  "G2",    "G3",   "X1",  "Y-2", "Z.5", "I1",  "J0",  "K",  "R5",  "F100",
+      "G4",  "P1",  "G43.4", "H1",   "G49", "G28", "G53", "G61", "G64", "C9", "A-8", "(x)",
+      "G91", "G18", "G20",   "G93",  "M19", "M5",  "S1",  "\n",  "\n",  "\n", ";",   "$",
+      "G55", "N1",  "M0",    "X1e9", "--",  "\r",  "G54", "G19", "M1",  " ",  "G90", "%"};
+  int read = 0;
+  for (int i = 0; i < 3000; ++i) {
+    std::string text;
+    const std::size_t count = 1 + random() % 12;
+    for (std::size_t k = 0; k < count; ++k) text += kPieces[random() % std::size(kPieces)];
+    try {
+      read_blocks(text + "\nM30\n", test_machine());
+      ++read;
+    } catch (const ProgramError&) {
+    }
+  }
+  EXPECT_GT(read, 100);
+  EXPECT_LT(read, 2900);
+}
 
 TEST(RefusedPrograms, AreMany) { EXPECT_GE(std::size(kWrong), 60u); }
 

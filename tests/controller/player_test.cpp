@@ -106,46 +106,65 @@ double distance(const Vec3& p, const Move& move) {
   return off(0.5 * (lo + hi));
 }
 
-TEST(Player, RandomProgramsKeepLimitsAndTolerance) {
+class RandomPrograms : public testing::TestWithParam<const char*> {};
+
+TEST_P(RandomPrograms, KeepLimitsAndTolerance) {
+  const std::string name = GetParam();
+  const Machine machine = machine_of(name);
+  for (unsigned seed = 1; seed <= 120; ++seed) {
+    RandomProgram random(seed);
+    const std::string text = random.text();
+    SCOPED_TRACE(name + " seed " + std::to_string(seed));
+    const ProgramFile file(text);
+    std::vector<Move> moves;
+    std::vector<PlayerStep> steps;
+    try {
+      moves = read_moves(text, machine);
+      steps = play_file(file.path(), machine);
+    } catch (const ProgramError& error) {
+      ADD_FAILURE() << error.what() << "\n" << text;
+      continue;
+    }
+    expect_motion_is_sound(steps, machine);
+
+    const FrameMap map(machine.kinematics, moves.back().frame);
+    const Coordinates end = map.to_axes(moves.back().end);
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      EXPECT_NEAR(steps.back().position[i], end[static_cast<Eigen::Index>(i)], 1e-12);
+
+    double worst = 0;
+    std::size_t near = 0;
+    for (std::size_t k = 0; k < steps.size(); k += 11) {
+      while (near + 1 < moves.size() && moves[near].line < steps[k].line) ++near;
+      if (moves[near].line != steps[k].line) continue;
+      const Coordinates q = Eigen::Map<const Coordinates>(steps[k].position.data());
+      const Vec3 p = map.from_axes(q).head<3>();
+      double nearest = 1e9;
+      const std::size_t first = near > 3 ? near - 3 : 0;
+      for (std::size_t i = first; i < std::min(near + 4, moves.size()); ++i)
+        nearest = std::min(nearest, distance(p, moves[i]));
+      worst = std::max(worst, nearest / (moves[near].exact ? 0.5e-6 : moves[near].tolerance));
+    }
+    EXPECT_LE(worst, 1.001);
+    if (testing::Test::HasFailure()) FAIL() << text;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Player, RandomPrograms, testing::Values("trunnion", "head"));
+
+TEST(Player, AwkwardProgramsKeepTheLimits) {
+  // Remnants of nanometres, reversals, huge and tiny tolerances, the pole, turns on the spot.
+  const char* const kPrograms[] = {
+      "G91\nG1 X0.00001 F100\nX0.00000001\nX0.00001\nY0.00001\nG4 P0\nX0.00000001\nG4 P0\n"
+      "X0.000001 A0.000001\nG1 X100 F20000\nX-100\nX0\nX100\nX-100\nG64 P5\nX100\nY100\nX-100\n"
+      "Y-100\nG64 P0.00001\nX10\nY10\nX-10\nX10\nG61\nG2 X10 Y0 R5\nG3 X10 Y0 R5\nG2 I10\n"
+      "G1 A90 F10000\nC3000\nA-90\nC-3000\nG43.4 H1\nA10 C10\nX1 A10 C10\nA-20\nM30\n",
+      "G43.4 H1\nG1 X50 Y0 Z50 F2000\nA0 C0\nA1\nA0\nC90\nA-1\nG1 X50 A0 C0\nX-50 Y0.001 A30 C180\n"
+      "X50 A-30\nX0 Y0 Z20 A0 C0\nG2 X0 Y0 I10 A20 C360 F5000\nG18 G3 X20 Z20 I10 F1000\n"
+      "X0 A-20 I-10\nG19 G2 Y20 Z20 J10 K5\nM30\n"};
   for (const std::string name : {"trunnion", "head"}) {
     const Machine machine = machine_of(name);
-    for (unsigned seed = 1; seed <= 120; ++seed) {
-      RandomProgram random(seed);
-      const std::string text = random.text();
-      SCOPED_TRACE(name + " seed " + std::to_string(seed));
-      const ProgramFile file(text);
-      std::vector<Move> moves;
-      std::vector<PlayerStep> steps;
-      try {
-        moves = read_moves(text, machine);
-        steps = play_file(file.path(), machine);
-      } catch (const ProgramError& error) {
-        ADD_FAILURE() << error.what() << "\n" << text;
-        continue;
-      }
-      expect_motion_is_sound(steps, machine);
-
-      const FrameMap map(machine.kinematics, moves.back().frame);
-      const Coordinates end = map.to_axes(moves.back().end);
-      for (std::size_t i = 0; i < kAxisCount; ++i)
-        EXPECT_NEAR(steps.back().position[i], end[static_cast<Eigen::Index>(i)], 1e-12);
-
-      double worst = 0;
-      std::size_t near = 0;
-      for (std::size_t k = 0; k < steps.size(); k += 11) {
-        while (near + 1 < moves.size() && moves[near].line < steps[k].line) ++near;
-        if (moves[near].line != steps[k].line) continue;
-        const Coordinates q = Eigen::Map<const Coordinates>(steps[k].position.data());
-        const Vec3 p = map.from_axes(q).head<3>();
-        double nearest = 1e9;
-        const std::size_t first = near > 3 ? near - 3 : 0;
-        for (std::size_t i = first; i < std::min(near + 4, moves.size()); ++i)
-          nearest = std::min(nearest, distance(p, moves[i]));
-        worst = std::max(worst, nearest / (moves[near].exact ? 0.5e-6 : moves[near].tolerance));
-      }
-      EXPECT_LE(worst, 1.001);
-      if (testing::Test::HasFailure()) FAIL() << text;
-    }
+    for (const char* program : kPrograms) expect_motion_is_sound(play(program, machine), machine);
   }
 }
 

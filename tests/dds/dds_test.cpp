@@ -157,8 +157,8 @@ TEST(Dds, PacedMachineNeverWaitsAndItsDropsAreKnown) {
     before = row.tick;
   }
   // Missing ticks between received rows, plus those at the edges, are all that was lost.
-  const double inner = sink.rows.back().tick - sink.rows.front().tick + 1 -
-                       static_cast<double>(sink.rows.size());
+  const double inner =
+      sink.rows.back().tick - sink.rows.front().tick + 1 - static_cast<double>(sink.rows.size());
   EXPECT_EQ(inner + static_cast<double>(sink.ends[0].gaps - 1),
             static_cast<double>(publisher.dropped()));
 }

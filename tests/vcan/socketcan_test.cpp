@@ -61,8 +61,13 @@ TEST(Socketcan, InterfaceIsUsable) { EXPECT_NO_THROW(open_transport(uri(), 0)); 
 
 TEST(Socketcan, FramesArriveAsTheyWereSentInOrder) {
   SocketcanTransport a(interface()), b(interface());
-  Frames sent{encode(Nmt{}), encode(Sync{7}), encode(GroupCommand{.tick = 5}), encode(DriveStatus{.node = 3, .position = 0.1}),
-              encode(ProbeSample{.tick = 9}), encode(OvertravelState{}), encode(Emergency{.node = 1, .code = 0x8611})};
+  Frames sent{encode(Nmt{}),
+              encode(Sync{7}),
+              encode(GroupCommand{.tick = 5}),
+              encode(DriveStatus{.node = 3, .position = 0.1}),
+              encode(ProbeSample{.tick = 9}),
+              encode(OvertravelState{}),
+              encode(Emergency{.node = 1, .code = 0x8611})};
   constexpr int kLengths[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
   for (const int len : kLengths) {
     Frame frame;
@@ -81,7 +86,8 @@ TEST(Socketcan, FramesArriveAsTheyWereSentInOrder) {
 TEST(Socketcan, SlotsBeyondOneBatchArriveWhole) {
   SocketcanTransport a(interface()), b(interface());
   Frames sent;
-  for (int i = 0; i < 200; ++i) sent.push_back(encode(Emergency{.node = 1 + i % 100, .code = static_cast<std::uint16_t>(i)}));
+  for (int i = 0; i < 200; ++i)
+    sent.push_back(encode(Emergency{.node = 1 + i % 100, .code = static_cast<std::uint16_t>(i)}));
   a.send(sent);
   EXPECT_EQ(receive(b, sent.size()), sent);
   EXPECT_EQ(b.lost(), 0u);
@@ -186,7 +192,8 @@ TEST(Socketcan, KilledNodeTimesOutByName) {
   const auto bus = open_transport(uri(), 0);
   toy::ToyMaster master(100000);
   Pacer pacer;
-  const auto result = run_main_loop(master, *bus, toy::roster(3), {.pacer = pacer, .answer_timeout_ms = 1000});
+  const auto result =
+      run_main_loop(master, *bus, toy::roster(3), {.pacer = pacer, .answer_timeout_ms = 1000});
   EXPECT_FALSE(result.complete);
   EXPECT_EQ(result.failure, "no answer within 1000 ms in cycle 40 from: toy 2");
   EXPECT_EQ(toys.wait(), (std::vector<int>{0, 128 + SIGKILL, 0}));

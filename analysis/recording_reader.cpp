@@ -1,0 +1,138 @@
+#include <bit>
+#include <charconv>
+#include <optional>
+
+#include "analysis/hdf5_file.hpp"
+#include "analysis/recording.hpp"
+#include "analysis/whole_file.hpp"
+
+namespace vcnc {
+
+using namespace hdf5;  // NOLINT: this file is written in its terms
+
+struct RecordingReader::File {
+  Handle file, rows;
+};
+
+namespace {
+
+std::filesystem::path find_recording(std::filesystem::path path) {
+  std::error_code ignored;
+  const std::filesystem::path given = path;
+  if (std::filesystem::is_directory(path, ignored)) path /= kRecordingName;
+  if (std::filesystem::exists(path, ignored)) return path;
+  if (std::filesystem::exists(partial(path), ignored)) return partial(path);
+  if (path != given)
+    throw RecordingError(fmt::format("{}: the folder holds no {}", given.string(), kRecordingName));
+  throw RecordingError(given.string() + ": no such file or folder");
+}
+
+std::vector<Alarm> read_alarms(hid_t file) {
+  const Handle table(H5Dopen2(file, "alarms", H5P_DEFAULT));
+  if (!table.ok()) return {};
+  std::vector<AlarmRow> rows(row_count(table, nullptr));
+  if (rows.empty()) return {};
+  const Handle type = alarm_type(), space(H5Dget_space(table));
+  if (H5Dread(table, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()) < 0) return {};
+  std::vector<Alarm> alarms;
+  for (const AlarmRow& r : rows)
+    alarms.push_back(
+        {r.tick, static_cast<int>(r.code), r.source ? r.source : "", r.text ? r.text : ""});
+  H5Dvlen_reclaim(type, space, H5P_DEFAULT, rows.data());
+  return alarms;
+}
+
+/// Nothing when the run never ended.
+std::optional<RunEnd> read_end(hid_t file) {
+  RunEnd end;
+  std::int64_t complete = 0;
+  if (!read(file, "complete", complete) || !read(file, "reason", end.reason) ||
+      !read(file, "cycles", end.cycles) || !read(file, "trace_hash", end.trace_hash) ||
+      !read(file, "wall_seconds", end.wall_seconds) ||
+      !read(file, "bus_load_worst", end.bus_load_worst) || !read(file, "gaps", end.gaps))
+    return std::nullopt;
+  end.complete = complete != 0;
+  return end;
+}
+
+}  // namespace
+
+RecordingReader::RecordingReader(const std::filesystem::path& path)
+    : path_(find_recording(path)), file_(std::make_unique<File>()) {
+  const Quiet quiet;
+  File& f = *file_;
+  f.file = Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
+  if (!f.file.ok())
+    fail(path_, H5Fis_hdf5(path_.c_str()) > 0 ? "the recording is damaged and cannot be opened"
+                                              : "is not an HDF5 file or cannot be read");
+  std::string format;
+  std::int64_t version = 0;
+  errno = 0;
+  if (!read(f.file, "format", format) || format != kFormat)
+    fail(path_, "is an HDF5 file, but not a vcnc recording");
+  if (!read(f.file, "format_version", version) || version != kFormatVersion)
+    throw RecordingError(fmt::format("{}: recording format {}; this program reads format {}",
+                                     path_.string(), version, kFormatVersion));
+  const auto need = [&](bool there, const char* what) {
+    if (!there) missing_.emplace_back(what);
+  };
+  need(read(f.file, "run_id", begin_.run_id), "run id");
+  need(read(f.file, "program_name", begin_.program_name), "program name");
+  need(read(f.file, "machine_toml", begin_.declared_toml), "machine");
+  need(read(f.file, "piece_toml", begin_.piece_toml), "piece");
+  need(read(f.file, "seed", begin_.seed), "seed");
+  hsize_t width = 0;
+  f.rows = Handle(H5Dopen2(f.file, "rows", H5P_DEFAULT));
+  if (!f.rows.ok()) fail(path_, "holds no rows");
+  rows_ = row_count(f.rows, &width);
+  if (width != kRowWidth)
+    throw RecordingError(fmt::format("{}: rows have {} channels; this program reads {}",
+                                     path_.string(), width, kRowWidth));
+  alarms_ = read_alarms(f.file);
+  if (const auto end = read_end(f.file)) {
+    end_ = *end;
+  } else {
+    need(false, "end of the run");
+    end_.cycles = static_cast<std::int64_t>(rows_);
+  }
+}
+
+RecordingReader::~RecordingReader() = default;
+
+void RecordingReader::for_each(const std::function<void(const TelemetryRow&)>& f) const {
+  std::vector<TelemetryRow> block(kBlockRows);
+  const Handle space(H5Dget_space(file_->rows));
+  for (hsize_t at = 0; at < rows_; at += kBlockRows) {
+    const std::array<hsize_t, 2> start{at, 0},
+        count{std::min<hsize_t>(kBlockRows, rows_ - at), kRowWidth};
+    {
+      const Quiet quiet;
+      const Handle memory(H5Screate_simple(2, count.data(), nullptr));
+      H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
+      if (H5Dread(file_->rows, H5T_NATIVE_DOUBLE, memory, space, H5P_DEFAULT, block.data()) < 0)
+        fail(path_, "rows cannot be read");
+    }
+    for (hsize_t i = 0; i < count[0]; ++i) f(block[i]);
+  }
+}
+
+void write_csv(const RecordingReader& recording, const std::filesystem::path& path) {
+  WholeFile file(path);
+  std::string line;
+  for (const Channel& c : kChannels)
+    line += fmt::format("{}{} [{}]", line.empty() ? "" : ",", c.name, c.unit);
+  file.stream() << line << '\n';
+  recording.for_each([&](const TelemetryRow& row) {
+    line.clear();
+    for (const double v : std::bit_cast<std::array<double, kRowWidth>>(row)) {
+      std::array<char, 32> text{};
+      const auto end = std::to_chars(text.data(), text.data() + text.size(), v).ptr;
+      if (!line.empty()) line += ',';
+      line.append(text.data(), end);
+    }
+    file.stream() << line << '\n';
+  });
+  file.commit();
+}
+
+}  // namespace vcnc
