@@ -3,8 +3,9 @@
 // One table per message in messages.cpp (offset, width, scale) is the only place that knows byte
 // positions. All numbers are little-endian. Positions travel as 48-bit integers of 0.1 nm or
 // 1e-10 rad, velocities as 32-bit integers of 10 nm/s or 1e-8 rad/s, spindle speeds in 1e-5 rad/s.
-// The codec saturates at the ends, which are symmetric; the most negative code says "not a number" and
-// is decoded as such, so a value that is none cannot pass for a position. Bytes without a field are 0.
+// The codec saturates at the ends, which are symmetric; the most negative code says "not a number"
+// and is decoded as such, so a value that is none cannot pass for a position. Bytes without a field
+// are 0.
 //
 //   COB-ID    sender      bytes  message
 //   000       NC unit     2      NMT command
@@ -64,7 +65,9 @@ struct GroupCommand {
     double position = 0;  ///< [m or rad]
     double velocity = 0;  ///< [m/s or rad/s] at that position
   };
-  enum class SpindleMode : std::uint8_t { off = 0, clockwise = 1, counter_clockwise = 2, orient = 3 };
+  enum class SpindleMode : std::uint8_t {
+    off = 0, clockwise = 1, counter_clockwise = 2, orient = 3
+  };
   std::uint16_t tick = 0;          ///< low 16 bits of the tick in which it was sent
   std::uint16_t controlword = 0;   ///< CiA 402, for the five axes together
   std::array<Setpoint, 5> axes{};
@@ -104,8 +107,8 @@ struct OvertravelState {
 };
 
 // ------------------------------------------------------------------ codecs
-// encode() never fails: values saturate. decode_x() gives nothing for a wrong identifier, a wrong length
-// or a code of an enumeration that does not exist.
+// encode() never fails: values saturate. decode_x() gives nothing for a wrong identifier, a wrong
+// length or a code of an enumeration that does not exist.
 Frame encode(const Nmt&);
 Frame encode(const Sync&);
 Frame encode(const Heartbeat&);

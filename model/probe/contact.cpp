@@ -72,8 +72,14 @@ Vec3 ProbeContact::step(const ToolPose& pose) {
 }
 
 void ProbeContact::touch(double inertia, Vec3& v) {
-  surface_ = piece_->nearest(p_ + kStep * v, surface_);
+  const Vec3 end = p_ + kStep * v;
+  // The distance from a solid changes by no more than the way travelled, so far away need not be
+  // searched.
+  if ((end - searched_).norm() < clearance_) return;
+  surface_ = piece_->nearest(end, surface_);
   const double gap = surface_.distance - probe_.ball_radius;
+  searched_ = end;
+  clearance_ = surface_.valid ? gap : 0;
   if (!surface_.valid || gap >= 0) return;
   touching_ = true;
   const Vec3& n = surface_.n;

@@ -81,7 +81,7 @@ class ProbeContact {
   bool touching() const { return touching_; }
   /// Contact force on the ball over the last step, workpiece frame [N].
   const Vec3& force() const { return force_; }
-  /// Where the ball is, and the surface nearest to it (valid once there is a piece).
+  /// Where the ball is, and the surface nearest to it (valid near the piece).
   const Vec3& ball() const { return p_; }
   const SurfacePoint& surface() const { return surface_; }
 
@@ -97,6 +97,8 @@ class ProbeContact {
   Vec3 v_ = Vec3::Zero();       ///< its velocity
   Vec3 p_tool_ = Vec3::Zero();  ///< controlled point at the last step
   SurfacePoint surface_;
+  Vec3 searched_ = Vec3::Zero();  ///< where the piece was searched last
+  double clearance_ = 0;          ///< and how far the ball may go from there without touching
   Vec3 force_ = Vec3::Zero();
   bool placed_ = false, touching_ = false;
 };

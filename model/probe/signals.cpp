@@ -18,10 +18,10 @@ double wrap(double angle) { return angle - 2 * kPi * std::round(angle / (2 * kPi
 
 }  // namespace
 
-double Adc::lsb() const { return std::ldexp(kReference, -bits); }
+double Adc::lsb() const { return kReference / (1u << bits); }
 
 std::uint16_t Adc::code(double signal) const {
-  const double most = std::ldexp(1.0, bits) - 1;
+  const double most = (1u << bits) - 1;
   return static_cast<std::uint16_t>(
       std::clamp(std::round((kMiddle + kGain * signal) / lsb()), 0.0, most));
 }
