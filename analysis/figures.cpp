@@ -239,7 +239,7 @@ std::string load_figure(const Curves& curves) {
       "set xlabel 'time  [s]'\nset yrange [0:105]\nset ytics 25\nset ylabel 'bus load  [%]'\n"
       "set y2range [0:{:.6g}]\nset y2tics out scale 0.6 textcolor rgb '#333333'\n"
       "set y2label 'feed  [mm/min]' offset -1\nset key at graph 1,graph 1.17 noopaque\n",
-      kLeft, std::max(feed * 60e3 * 1.4, 1.0));
+      kLeft, std::max(feed * 60e3 * 2.0, 1.0));
   return text + "plot " + line("load", "bus load", kInk) + ", " + line("feed", "feed", kOrange) +
          " axes x1y2\n";
 }

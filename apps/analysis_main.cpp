@@ -1,5 +1,5 @@
-// vcnc-analysis: subscribes to the machine's telemetry, computes the dynamic error live, records the
-// run and writes the results. It is given nothing but what the NC unit publishes.
+// vcnc-analysis: subscribes to the machine's telemetry, computes the dynamic error live, records
+// the run and writes the results. It is given nothing but what the NC unit publishes.
 #include "analysis/session.hpp"
 #include "apps/control_pipe.hpp"
 #include "apps/live_line.hpp"
@@ -12,7 +12,8 @@ int analysis(int argc, char** argv) {
   using namespace vcnc;
   const NodeOptions options = parse_node_options(argc, argv, "Live analysis of a run", "o");
   const ControlPipe launcher(options.control_fd);
-  AnalysisSession session({.folder = options.out, .report = !options.no_report, .csv = options.csv});
+  AnalysisSession session(
+      {.folder = options.out, .report = !options.no_report, .csv = options.csv});
   LiveLine live(session, [&](const std::string& text) { launcher.progress(text); });
   DdsSubscriber subscriber(live);
   launcher.ready();
@@ -22,4 +23,6 @@ int analysis(int argc, char** argv) {
 
 }  // namespace
 
-int main(int argc, char** argv) { return vcnc::guarded_main("vcnc-analysis", analysis, argc, argv); }
+int main(int argc, char** argv) {
+  return vcnc::guarded_main("vcnc-analysis", analysis, argc, argv);
+}

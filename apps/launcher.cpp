@@ -21,7 +21,8 @@ namespace {
 std::string system_error(const std::string& what) { return what + ": " + std::strerror(errno); }
 
 std::string read_words(int fd) {
-  std::string text(static_cast<std::size_t>(std::clamp<off_t>(::lseek(fd, 0, SEEK_END), 0, 1 << 16)), '\0');
+  std::string text(
+      static_cast<std::size_t>(std::clamp<off_t>(::lseek(fd, 0, SEEK_END), 0, 1 << 16)), '\0');
   const ssize_t got = ::pread(fd, text.data(), text.size(), 0);
   text.resize(static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
@@ -31,7 +32,8 @@ std::string read_words(int fd) {
 }  // namespace
 
 std::string Exited::sentence() const {
-  return last_words.empty() ? fmt::format("{}: {}", name, how) : fmt::format("{}: {}: {}", name, how, last_words);
+  return last_words.empty() ? fmt::format("{}: {}", name, how)
+                            : fmt::format("{}: {}: {}", name, how, last_words);
 }
 
 std::string program_directory() {
@@ -92,7 +94,8 @@ Exited Launcher::reap(std::size_t index) {
   Exited exited{.name = child.name, .last_words = read_words(child.words)};
   if (WIFSIGNALED(status)) {
     exited.code = 128 + WTERMSIG(status);
-    exited.how = fmt::format("killed by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status)));
+    exited.how =
+        fmt::format("killed by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status)));
   } else {
     exited.code = WEXITSTATUS(status);
     exited.how = fmt::format("exit code {}", exited.code);
@@ -116,10 +119,12 @@ void Launcher::wait_all_ready(int timeout_ms) {
   for (int waited = 0;; waited += kStep) {
     // A burst of messages ends a step early, so the time-out is a lower bound on the patience.
     while (auto exited = next(0, nullptr)) throw LaunchError(exited->sentence());
-    const auto silent = std::find_if(children_.begin(), children_.end(), [](const Child& c) { return !c.ready; });
+    const auto silent =
+        std::find_if(children_.begin(), children_.end(), [](const Child& c) { return !c.ready; });
     if (silent == children_.end()) return;
     if (waited >= timeout_ms)
-      throw LaunchError(fmt::format("{}: not ready after {:.0f} s", silent->name, timeout_ms / 1000.0));
+      throw LaunchError(
+          fmt::format("{}: not ready after {:.0f} s", silent->name, timeout_ms / 1000.0));
     if (auto exited = next(kStep, nullptr)) throw LaunchError(exited->sentence());
   }
 }
@@ -130,7 +135,8 @@ void Launcher::signal(const std::string& name, int signal_number) {
 }
 
 bool Launcher::running(const std::string& name) const {
-  return std::any_of(children_.begin(), children_.end(), [&](const Child& c) { return c.name == name; });
+  return std::any_of(children_.begin(), children_.end(),
+                     [&](const Child& c) { return c.name == name; });
 }
 
 void Launcher::kill_all() {

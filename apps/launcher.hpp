@@ -1,8 +1,8 @@
 // Starts the programs of a machine, listens to them, and leaves none behind.
 //
-// Each child gets a control pipe (apps/control_pipe.hpp) and its stderr is kept in memory, so that when
-// one fails the message can say which, how and its last words. Children are killed when the launcher
-// dies, however it dies.
+// Each child gets a control pipe (apps/control_pipe.hpp) and its stderr is kept in memory, so that
+// when one fails the message can say which, how and its last words. Children are killed when the
+// launcher dies, however it dies.
 #pragma once
 
 #include <sys/types.h>
@@ -24,7 +24,7 @@ class LaunchError : public std::runtime_error {
 /// A process that ended.
 struct Exited {
   std::string name;
-  int code = 0;            ///< exit code, or 128 + signal
+  int code = 0;              ///< exit code, or 128 + signal
   std::string how{};         ///< "exit code 1", "killed by signal 9 (Killed)"
   std::string last_words{};  ///< what it wrote to stderr, without the trailing newline
 
@@ -43,8 +43,8 @@ class Launcher {
   /// Starts a program; "--control-fd N" is appended to its arguments.
   void start(const std::string& name, std::vector<std::string> argv);
 
-  /// Waits until every started process said that it is ready. Throws LaunchError naming the one that
-  /// ended or stayed silent.
+  /// Waits until every started process said that it is ready. Throws LaunchError naming the one
+  /// that ended or stayed silent.
   void wait_all_ready(int timeout_ms);
 
   /// Waits up to timeout_ms for something to happen; gives an exit if there was one.

@@ -12,7 +12,8 @@ std::string text_of(const LiveView& v) {
     text += fmt::format("  e_n {:+7.2f} um", v.e_n * 1e6);
   else
     text += "  e_n   (off path)";
-  text += fmt::format("  [{:+.2f} .. {:+.2f}]  covered {:5.1f} %", v.e_n_min * 1e6, v.e_n_max * 1e6, v.coverage_percent);
+  text += fmt::format("  [{:+.2f} .. {:+.2f}]  covered {:5.1f} %", v.e_n_min * 1e6, v.e_n_max * 1e6,
+                      v.coverage_percent);
   if (v.failed) text += "  OUT OF TOLERANCE";
   if (v.alarms > 0) text += fmt::format("  {} alarm{}", v.alarms, v.alarms == 1 ? "" : "s");
   return text;

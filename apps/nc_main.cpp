@@ -21,13 +21,14 @@ int nc(int argc, char** argv) {
   telemetry.paced = options.pace > 0;
   DdsPublisher publisher(telemetry);
   publisher.wait_for_subscriber(kSubscriberTimeoutMs);
-  const NcRunResult result = run_nc(machine,
-                                    {.program = options.program,
-                                     .pace = options.pace,
-                                     .seed = options.seed,
-                                     .piece_toml = machine.setup.piece.empty() ? "" : to_toml(load_piece(machine.setup.piece)),
-                                     .stop = &stop_requested()},
-                                    *transport, publisher);
+  const NcRunResult result = run_nc(
+      machine,
+      {.program = options.program,
+       .pace = options.pace,
+       .seed = options.seed,
+       .piece_toml = machine.setup.piece.empty() ? "" : to_toml(load_piece(machine.setup.piece)),
+       .stop = &stop_requested()},
+      *transport, publisher);
   if (result.exit_code() == kExitFailure) std::cerr << result.end.reason;
   return result.exit_code();
 }

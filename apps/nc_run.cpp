@@ -18,7 +18,8 @@ int NcRunResult::exit_code() const {
   return interrupted ? kExitInterrupted : kExitFailure;
 }
 
-NcRunResult run_nc(const Machine& machine, const NcRunOptions& options, Transport& transport, TelemetrySink& sink) {
+NcRunResult run_nc(const Machine& machine, const NcRunOptions& options, Transport& transport,
+                   TelemetrySink& sink) {
   NcUnit nc(machine, options.program, sink);
   sink.begin({.run_id = std::to_string(::getpid()),
               .program_name = std::filesystem::path(options.program).filename().string(),
@@ -35,7 +36,9 @@ NcRunResult run_nc(const Machine& machine, const NcRunOptions& options, Transpor
   result.alarmed = nc.alarmed();
   result.interrupted = !loop.complete && options.stop && *options.stop;
   result.end = {.complete = loop.complete && nc.complete(),
-                .reason = result.interrupted ? "stopped by the operator" : loop.failure.empty() ? nc.reason() : loop.failure,
+                .reason = result.interrupted     ? "stopped by the operator"
+                          : loop.failure.empty() ? nc.reason()
+                                                 : loop.failure,
                 .cycles = loop.cycles,
                 .trace_hash = loop.trace_hash,
                 .wall_seconds = pacer.elapsed(),

@@ -12,10 +12,10 @@
 namespace vcnc {
 
 struct NcRunOptions {
-  std::string program;            ///< path of the G-code
-  double pace = 0;                ///< times real time, 0 = free-running
+  std::string program;  ///< path of the G-code
+  double pace = 0;      ///< times real time, 0 = free-running
   std::uint64_t seed = 1;
-  std::string piece_toml;         ///< for the record
+  std::string piece_toml;                   ///< for the record
   const std::atomic<bool>* stop = nullptr;  ///< set: end the run in order (Ctrl-C)
 };
 
@@ -26,8 +26,9 @@ struct NcRunResult {
   int exit_code() const;
 };
 
-/// Plays the program. Throws ProgramError and BusError before anything moves; what goes wrong later is
-/// in the result.
-NcRunResult run_nc(const Machine& machine, const NcRunOptions& options, Transport& transport, TelemetrySink& sink);
+/// Plays the program. Throws ProgramError and BusError before anything moves; what goes wrong later
+/// is in the result.
+NcRunResult run_nc(const Machine& machine, const NcRunOptions& options, Transport& transport,
+                   TelemetrySink& sink);
 
 }  // namespace vcnc

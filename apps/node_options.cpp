@@ -15,7 +15,8 @@ NodeOptions parse_node_options(int argc, char** argv, const char* description, c
   if (with('m')) app.add_option("--machine", o.machine, "machine file")->required();
   if (with('p')) {
     app.add_option("--program", o.program, "G-code program")->required();
-    app.add_option("--pace", o.pace, "times real time, 0 = free-running")->check(CLI::NonNegativeNumber);
+    app.add_option("--pace", o.pace, "times real time, 0 = free-running")
+        ->check(CLI::NonNegativeNumber);
   }
   if (with('b')) app.add_option("--bus", o.bus, "hub:///PATH or can://INTERFACE")->required();
   if (with('t')) app.add_option("--truth", o.truth, "path of the ground-truth channel")->required();

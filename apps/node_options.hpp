@@ -7,16 +7,16 @@
 namespace vcnc {
 
 struct NodeOptions {
-  std::string machine;       ///< resolved machine file
-  std::string program;       ///< G-code (NC unit)
-  std::string bus;           ///< transport URI
-  std::string truth;         ///< path of the ground-truth channel (simulators)
-  std::string axis;          ///< X Y Z A C or "spindle" (drives)
-  std::string out;           ///< result directory (analysis)
-  double pace = 0;           ///< times real time; 0 = free-running
+  std::string machine;  ///< resolved machine file
+  std::string program;  ///< G-code (NC unit)
+  std::string bus;      ///< transport URI
+  std::string truth;    ///< path of the ground-truth channel (simulators)
+  std::string axis;     ///< X Y Z A C or "spindle" (drives)
+  std::string out;      ///< result directory (analysis)
+  double pace = 0;      ///< times real time; 0 = free-running
   std::uint64_t seed = 1;
-  bool csv = false;          ///< analysis: also write rows.csv
-  bool no_report = false;    ///< analysis: no report.html
+  bool csv = false;        ///< analysis: also write rows.csv
+  bool no_report = false;  ///< analysis: no report.html
   int control_fd = -1;
 };
 
@@ -24,11 +24,12 @@ struct NodeOptions {
 /// b bus, t truth, a axis, o out, s seed.
 NodeOptions parse_node_options(int argc, char** argv, const char* description, const char* needs);
 
-/// Runs a program's body: prints an exception as one line on stderr and turns it into exit code 2 for
-/// bad input (InputError) or 1 for everything else.
+/// Runs a program's body: prints an exception as one line on stderr and turns it into exit code 2
+/// for bad input (InputError) or 1 for everything else.
 int guarded_main(const char* name, int (*body)(int, char**), int argc, char** argv);
 
 /// Exit codes of every program.
-inline constexpr int kExitOk = 0, kExitFailure = 1, kExitBadInput = 2, kExitAlarm = 3, kExitInterrupted = 130;
+inline constexpr int kExitOk = 0, kExitFailure = 1, kExitBadInput = 2, kExitAlarm = 3,
+                     kExitInterrupted = 130;
 
 }  // namespace vcnc

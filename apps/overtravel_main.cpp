@@ -7,11 +7,14 @@ namespace {
 
 int overtravel(int argc, char** argv) {
   using namespace vcnc;
-  const NodeOptions options = parse_node_options(argc, argv, "The overtravel protection on the bus", "mb");
+  const NodeOptions options =
+      parse_node_options(argc, argv, "The overtravel protection on the bus", "mb");
   OvertravelNode node(load_machine(options.machine));
   return serve(node, options);
 }
 
 }  // namespace
 
-int main(int argc, char** argv) { return vcnc::guarded_main("vcnc-overtravel", overtravel, argc, argv); }
+int main(int argc, char** argv) {
+  return vcnc::guarded_main("vcnc-overtravel", overtravel, argc, argv);
+}

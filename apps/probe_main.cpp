@@ -10,7 +10,8 @@ namespace {
 
 int probe(int argc, char** argv) {
   using namespace vcnc;
-  const NodeOptions options = parse_node_options(argc, argv, "The scanning probe on the bus", "mbts");
+  const NodeOptions options =
+      parse_node_options(argc, argv, "The scanning probe on the bus", "mbts");
   const Machine machine = load_machine(options.machine);
   std::unique_ptr<Piece> piece;
   if (!machine.setup.piece.empty()) piece = make_piece(load_piece(machine.setup.piece));

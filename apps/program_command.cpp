@@ -41,9 +41,10 @@ std::string program_text(const std::string& kind, const Machine& machine, const 
 /// Writes the file only if the machine can run it.
 void write_program(const std::string& kind, Arguments a) {
   const Machine machine = load_machine(a.machine, a.assignments);
-  a.ProgramOptions::direction =
-      a.direction == "cw" ? ProgramOptions::Direction::clockwise : ProgramOptions::Direction::counter_clockwise;
-  a.ProgramOptions::axis = static_cast<std::size_t>(std::find(kAxisNames.begin(), kAxisNames.end(), a.axis) - kAxisNames.begin());
+  a.ProgramOptions::direction = a.direction == "cw" ? ProgramOptions::Direction::clockwise
+                                                    : ProgramOptions::Direction::counter_clockwise;
+  a.ProgramOptions::axis = static_cast<std::size_t>(
+      std::find(kAxisNames.begin(), kAxisNames.end(), a.axis) - kAxisNames.begin());
   std::string text;
   try {
     text = program_text(kind, machine, a);
@@ -65,31 +66,42 @@ void write_program(const std::string& kind, Arguments a) {
   std::cout << a.out << ": " << std::count(text.begin(), text.end(), '\n') << " lines\n";
 }
 
-CLI::App* add_kind(CLI::App& program, const char* kind, const char* what, const std::shared_ptr<Arguments>& a) {
+CLI::App* add_kind(CLI::App& program, const char* kind, const char* what,
+                   const std::shared_ptr<Arguments>& a) {
   CLI::App* sub = program.add_subcommand(kind, what);
   sub->add_option("--machine", a->machine, "machine file; names the piece")->required();
-  sub->add_option("--set", a->assignments, "override a key of the machine file")->allow_extra_args(false);
+  sub->add_option("--set", a->assignments, "override a key of the machine file")
+      ->allow_extra_args(false);
   sub->add_option("--out", a->out, "G-code file to write")->required();
-  sub->add_option("--feed-mm-min", a->feed_mm_min, "feed of the lap (deg/min for a rotary step)")->check(CLI::PositiveNumber);
+  sub->add_option("--feed-mm-min", a->feed_mm_min, "feed of the lap (deg/min for a rotary step)")
+      ->check(CLI::PositiveNumber);
   sub->add_option("--tolerance-um", a->tolerance_um, "G64 P tolerance")->check(CLI::PositiveNumber);
   sub->callback([kind, a] { write_program(kind, *a); });
   return sub;
 }
 
 void add_scan_options(CLI::App* sub, const std::shared_ptr<Arguments>& a) {
-  sub->add_option("--approach-feed-mm-min", a->approach_feed_mm_min, "feed towards the piece")->check(CLI::PositiveNumber);
-  sub->add_option("--predeflection-mm", a->predeflection_mm, "interference; default: setup.predeflection_mm");
-  sub->add_option("--settle-s", a->settle_s, "dwell between approach and lap")->check(CLI::NonNegativeNumber);
+  sub->add_option("--approach-feed-mm-min", a->approach_feed_mm_min, "feed towards the piece")
+      ->check(CLI::PositiveNumber);
+  sub->add_option("--predeflection-mm", a->predeflection_mm,
+                  "interference; default: setup.predeflection_mm");
+  sub->add_option("--settle-s", a->settle_s, "dwell between approach and lap")
+      ->check(CLI::NonNegativeNumber);
   sub->add_option("--laps", a->laps, "number of laps")->check(CLI::Range(1, 1000));
 }
 
 void add_rim_options(CLI::App* sub, const std::shared_ptr<Arguments>& a) {
   add_scan_options(sub, a);
-  sub->add_option("--height-mm", a->height_mm, "of the ball centre above the base; default: mid-height");
-  sub->add_option("--chord-tolerance-um", a->chord_tolerance_um, "of the point list")->check(CLI::PositiveNumber);
-  sub->add_option("--run-in-mm", a->run_in_mm, "before and after the lap")->check(CLI::NonNegativeNumber);
-  sub->add_option("--approach-mm", a->approach_mm, "where the approach begins")->check(CLI::PositiveNumber);
-  sub->add_option("--clearance-mm", a->clearance_mm, "travel height over the piece")->check(CLI::PositiveNumber);
+  sub->add_option("--height-mm", a->height_mm,
+                  "of the ball centre above the base; default: mid-height");
+  sub->add_option("--chord-tolerance-um", a->chord_tolerance_um, "of the point list")
+      ->check(CLI::PositiveNumber);
+  sub->add_option("--run-in-mm", a->run_in_mm, "before and after the lap")
+      ->check(CLI::NonNegativeNumber);
+  sub->add_option("--approach-mm", a->approach_mm, "where the approach begins")
+      ->check(CLI::PositiveNumber);
+  sub->add_option("--clearance-mm", a->clearance_mm, "travel height over the piece")
+      ->check(CLI::PositiveNumber);
 }
 
 }  // namespace
@@ -103,16 +115,20 @@ void add_program_command(CLI::App& app) {
 
   CLI::App* circle = add_kind(*program, "circle", "laps inside a ring gauge, or free", a);
   add_scan_options(circle, a);
-  circle->add_option("--radius-mm", a->radius_mm, "radius of the path; default: from the ring")->check(CLI::PositiveNumber);
+  circle->add_option("--radius-mm", a->radius_mm, "radius of the path; default: from the ring")
+      ->check(CLI::PositiveNumber);
   circle->add_option("--direction", a->direction, "cw or ccw")->check(CLI::IsMember({"cw", "ccw"}));
-  circle->add_option("--plane", a->plane, "17 XY, 18 ZX, 19 YZ")->check(CLI::IsMember({17, 18, 19}));
-  circle->add_option("--height-mm", a->height_mm, "of the ball centre; default: mid-height of the ring");
+  circle->add_option("--plane", a->plane, "17 XY, 18 ZX, 19 YZ")
+      ->check(CLI::IsMember({17, 18, 19}));
+  circle->add_option("--height-mm", a->height_mm,
+                     "of the ball centre; default: mid-height of the ring");
 
   CLI::App* step = add_kind(*program, "step", "one axis in steps forward and back, with dwell", a);
   step->add_option("--axis", a->axis, "X Y Z A C")->check(CLI::IsMember({"X", "Y", "Z", "A", "C"}));
   step->add_option("--step", a->step_size, "size of a step [mm or deg]");
   step->add_option("--steps", a->steps, "number of steps")->check(CLI::Range(1, 10000));
-  step->add_option("--dwell-s", a->dwell_s, "dwell at each position")->check(CLI::NonNegativeNumber);
+  step->add_option("--dwell-s", a->dwell_s, "dwell at each position")
+      ->check(CLI::NonNegativeNumber);
 }
 
 }  // namespace vcnc

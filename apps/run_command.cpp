@@ -32,12 +32,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kReadyTimeoutMs = 20000;
-constexpr int kStopTimeoutMs = 5000;      ///< modules, after the NC unit has ended
-constexpr int kResultsTimeoutMs = 300000; ///< analysis, to write its results
+constexpr int kStopTimeoutMs = 5000;       ///< modules, after the NC unit has ended
+constexpr int kResultsTimeoutMs = 300000;  ///< analysis, to write its results
 
 int run_in_process(const RunOptions& options, const Machine& machine, const RunFolder& folder) {
   std::unique_ptr<PieceParams> piece;
-  if (!machine.setup.piece.empty()) piece = std::make_unique<PieceParams>(load_piece(machine.setup.piece));
+  if (!machine.setup.piece.empty())
+    piece = std::make_unique<PieceParams>(load_piece(machine.setup.piece));
   VirtualMachine modules(machine, piece.get(), options.seed);
   InprocTransport transport(modules.nodes());
   AnalysisSession session({.folder = folder.path(), .report = options.report, .csv = options.csv});
@@ -74,7 +75,9 @@ class SocketFolder {
  public:
   SocketFolder() {
     std::string pattern = (fs::temp_directory_path() / "vcnc-XXXXXX").string();
-    if (!::mkdtemp(pattern.data())) throw LaunchError("no temporary directory can be made in " + fs::temp_directory_path().string());
+    if (!::mkdtemp(pattern.data()))
+      throw LaunchError("no temporary directory can be made in " +
+                        fs::temp_directory_path().string());
     path_ = pattern;
   }
   ~SocketFolder() {
@@ -88,15 +91,16 @@ class SocketFolder {
 };
 
 /// Starts every module and the analysis, and waits until all are ready.
-void start_modules(Launcher& launcher, const RunOptions& options, const RunFolder& folder, const std::string& bus,
-                   const std::string& truth) {
+void start_modules(Launcher& launcher, const RunOptions& options, const RunFolder& folder,
+                   const std::string& bus, const std::string& truth) {
   const std::string bin = program_directory();
   const std::string machine = folder.machine_file();
   const std::string seed = std::to_string(options.seed);
   for (const char* axis : {"X", "Y", "Z", "A", "C", "spindle"})
-    launcher.start(fmt::format("drive {}", axis),
-                   {bin + "/vcnc-drive", "--machine", machine, "--bus", bus, "--truth", truth, "--axis", axis});
-  launcher.start("probe", {bin + "/vcnc-probe", "--machine", machine, "--bus", bus, "--truth", truth, "--seed", seed});
+    launcher.start(fmt::format("drive {}", axis), {bin + "/vcnc-drive", "--machine", machine,
+                                                   "--bus", bus, "--truth", truth, "--axis", axis});
+  launcher.start("probe", {bin + "/vcnc-probe", "--machine", machine, "--bus", bus, "--truth",
+                           truth, "--seed", seed});
   launcher.start("overtravel", {bin + "/vcnc-overtravel", "--machine", machine, "--bus", bus});
   std::vector<std::string> analysis{bin + "/vcnc-analysis", "--out", folder.path().string()};
   if (options.csv) analysis.push_back("--csv");
@@ -123,7 +127,8 @@ RunEnded watch(Launcher& launcher) {
       progress.show("stopping ...");
       launcher.signal("NC unit", SIGTERM);
     }
-    const auto exited = launcher.next(kStepMs, [&](const std::string& text) { progress.show(text); });
+    const auto exited =
+        launcher.next(kStepMs, [&](const std::string& text) { progress.show(text); });
     if (exited) {
       const bool nc = exited->name == "NC unit";
       if (nc) ended.nc_code = exited->code;
@@ -134,7 +139,8 @@ RunEnded watch(Launcher& launcher) {
       ending = ending || nc || analysis_died;
       patience_ms = launcher.running("analysis") ? kResultsTimeoutMs : kStopTimeoutMs;
     } else if (ending && (patience_ms -= kStepMs) <= 0) {
-      if (ended.failure.empty()) ended.failure = "modules still ran after the end of the run and were killed";
+      if (ended.failure.empty())
+        ended.failure = "modules still ran after the end of the run and were killed";
       launcher.kill_all();
     }
   }
@@ -154,9 +160,10 @@ int run_processes(const RunOptions& options, const RunFolder& folder) {
 
   Launcher launcher;
   start_modules(launcher, options, folder, bus, sockets.file("truth"));
-  launcher.start("NC unit", {program_directory() + "/vcnc-nc", "--machine", folder.machine_file(), "--program",
-                             fs::absolute(options.program).string(), "--bus", bus, "--pace", fmt::format("{}", options.pace),
-                             "--seed", std::to_string(options.seed)});
+  launcher.start("NC unit",
+                 {program_directory() + "/vcnc-nc", "--machine", folder.machine_file(), "--program",
+                  fs::absolute(options.program).string(), "--bus", bus, "--pace",
+                  fmt::format("{}", options.pace), "--seed", std::to_string(options.seed)});
 
   const RunEnded ended = watch(launcher);
   std::cout << text_of(folder.path() / "summary.txt");
@@ -170,14 +177,17 @@ int run_processes(const RunOptions& options, const RunFolder& folder) {
 int run_command(const RunOptions& options) {
   const Machine machine = load_machine(options.machine, options.assignments);
   if (!machine.setup.piece.empty()) check_piece(machine.setup.piece);
-  Player(options.program, machine);  // refuses a wrong program before anything is started or written
+  Player(options.program,
+         machine);  // refuses a wrong program before anything is started or written
   const bool in_process = options.in_process || options.bus == "inproc://";
   catch_stop_signals();
   RunFolder folder(options.out);
   folder.write_inputs(machine);
   try {
-    const int code = in_process ? run_in_process(options, machine, folder) : run_processes(options, folder);
-    if (fs::exists(folder.path() / "report.html")) std::cout << "report: " << (folder.path() / "report.html").string() << '\n';
+    const int code =
+        in_process ? run_in_process(options, machine, folder) : run_processes(options, folder);
+    if (fs::exists(folder.path() / "report.html"))
+      std::cout << "report: " << (folder.path() / "report.html").string() << '\n';
     return code;
   } catch (...) {
     folder.remove_if_without_results();

@@ -1,4 +1,5 @@
-// `vcnc run`: the whole machine plays a program, the analysis watches, the results land in a folder.
+// `vcnc run`: the whole machine plays a program, the analysis watches, the results land in a
+// folder.
 #pragma once
 
 #include <cstdint>

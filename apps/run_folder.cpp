@@ -11,8 +11,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array kFiles{"machine.toml", "piece.toml", "recording.h5", "recording.h5.partial",
-                            "summary.json", "summary.txt", "report.html", "rows.csv"};
+constexpr std::array kFiles{"machine.toml", "piece.toml",  "recording.h5", "recording.h5.partial",
+                            "summary.json", "summary.txt", "report.html",  "rows.csv"};
 
 void write_text(const fs::path& path, const std::string& text) {
   std::ofstream out(path, std::ios::binary);
@@ -29,7 +29,9 @@ RunFolder::RunFolder(const std::string& path) : path_(fs::absolute(path)) {
     throw InputError(path_.string() + ": is not a folder; --out needs a folder for the results");
   if (fs::is_directory(path_, error)) {
     if (!fs::is_empty(path_, error) && !fs::exists(path_ / "machine.toml", error))
-      throw InputError(path_.string() + ": holds other files; --out needs a new or empty folder, or one of an earlier run");
+      throw InputError(
+          path_.string() +
+          ": holds other files; --out needs a new or empty folder, or one of an earlier run");
     for (const char* file : kFiles) fs::remove(path_ / file, error);
     return;
   }
@@ -48,7 +50,9 @@ void RunFolder::write_inputs(const Machine& machine) {
 
 void RunFolder::remove_if_without_results() {
   std::error_code ignored;
-  if (fs::exists(path_ / "recording.h5", ignored) || fs::exists(path_ / "recording.h5.partial", ignored)) return;
+  if (fs::exists(path_ / "recording.h5", ignored) ||
+      fs::exists(path_ / "recording.h5.partial", ignored))
+    return;
   for (const char* file : kFiles) fs::remove(path_ / file, ignored);
   if (created_) fs::remove(path_, ignored);
 }

@@ -10,8 +10,8 @@ namespace vcnc {
 
 class RunFolder {
  public:
-  /// A folder that is new, empty or holds an earlier run, whose files are removed. Throws InputError for any
-  /// other folder, so that nothing of the user's is ever overwritten.
+  /// A folder that is new, empty or holds an earlier run, whose files are removed. Throws
+  /// InputError for any other folder, so that nothing of the user's is ever overwritten.
   explicit RunFolder(const std::string& path);
 
   /// machine.toml (all keys, as run) and piece.toml; self-contained: the machine names this piece.

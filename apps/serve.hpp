@@ -1,4 +1,5 @@
-// Runs one module of the machine as a process: opens the bus, says ready, answers until it is stopped.
+// Runs one module of the machine as a process: opens the bus, says ready, answers until it is
+// stopped.
 #pragma once
 
 #include "apps/node_options.hpp"

@@ -34,10 +34,12 @@ void add_run(CLI::App& app, int& code) {
     bool no_report = false;
   };
   const auto o = std::make_shared<Arguments>();
-  CLI::App* run = app.add_subcommand("run", "run a program on the virtual machine and measure its dynamic error");
+  CLI::App* run = app.add_subcommand(
+      "run", "run a program on the virtual machine and measure its dynamic error");
   run->add_option("PROGRAM", o->program, "G-code program")->required();
   run->add_option("--machine", o->machine, "machine file (TOML)")->required();
-  run->add_option("--set", o->assignments, "override a key of the machine file, e.g. axes.Y.kv_per_s=38")
+  run->add_option("--set", o->assignments,
+                  "override a key of the machine file, e.g. axes.Y.kv_per_s=38")
       ->allow_extra_args(false);
   run->add_option("--bus", o->bus, "hub:// (default), can://INTERFACE or inproc://");
   run->add_option("--pace", o->pace_text, "free (default) or a factor of real time");
@@ -61,7 +63,8 @@ void add_analyze(CLI::App& app) {
   const auto o = std::make_shared<Arguments>();
   CLI::App* analyze_command = app.add_subcommand("analyze", "evaluate a recording again");
   analyze_command->add_option("RUN", o->path, "recording or folder of a run")->required();
-  analyze_command->add_option("--out", o->out, "also write summary.json and report.html into this folder");
+  analyze_command->add_option("--out", o->out,
+                              "also write summary.json and report.html into this folder");
   analyze_command->add_flag("--csv", o->csv, "with --out: also write every row as rows.csv");
   analyze_command->callback([o] {
     const RecordingReader recording(o->path);
@@ -69,16 +72,23 @@ void add_analyze(CLI::App& app) {
       std::cerr << "vcnc: " << o->path << ": missing: " << missing << '\n';
     const Summary summary = analyze(recording);
     std::cout << to_text(summary);
-    if (!o->out.empty()) write_results(recording, summary, {.folder = o->out, .report = true, .csv = o->csv});
+    if (!o->out.empty())
+      write_results(recording, summary, {.folder = o->out, .report = true, .csv = o->csv});
   });
 }
 
 void add_references(CLI::App& app) {
   app.add_subcommand("keys", "all keys of machine and piece files, as Markdown")->callback([] {
-    std::cout << "# Keys of a machine file\n\n" << machine_key_reference() << "\n# Keys of a piece file\n\n" << piece_key_reference();
+    std::cout << "# Keys of a machine file\n\n"
+              << machine_key_reference() << "\n# Keys of a piece file\n\n"
+              << piece_key_reference();
   });
-  app.add_subcommand("wire", "all messages on the bus, as Markdown")->callback([] { std::cout << wire_table_markdown(); });
-  app.add_subcommand("dbc", "all messages on the bus, as a DBC file for CAN tools")->callback([] { std::cout << dbc(); });
+  app.add_subcommand("wire", "all messages on the bus, as Markdown")->callback([] {
+    std::cout << wire_table_markdown();
+  });
+  app.add_subcommand("dbc", "all messages on the bus, as a DBC file for CAN tools")->callback([] {
+    std::cout << dbc();
+  });
 }
 
 int command_line(int argc, char** argv) {
@@ -101,4 +111,6 @@ int command_line(int argc, char** argv) {
 }  // namespace
 }  // namespace vcnc
 
-int main(int argc, char** argv) { return vcnc::guarded_main("vcnc", vcnc::command_line, argc, argv); }
+int main(int argc, char** argv) {
+  return vcnc::guarded_main("vcnc", vcnc::command_line, argc, argv);
+}

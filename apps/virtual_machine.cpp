@@ -12,7 +12,8 @@ VirtualMachine::VirtualMachine(const Machine& machine, const PieceParams* piece,
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     nodes_.push_back(std::make_unique<DriveNode>(axis, machine, *truth_));
   nodes_.push_back(std::make_unique<SpindleNode>(machine));
-  nodes_.push_back(std::make_unique<ProbeNode>(machine, piece ? make_piece(*piece) : nullptr, seed, *truth_));
+  nodes_.push_back(
+      std::make_unique<ProbeNode>(machine, piece ? make_piece(*piece) : nullptr, seed, *truth_));
   nodes_.push_back(std::make_unique<OvertravelNode>(machine));
 }
 

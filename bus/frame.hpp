@@ -25,8 +25,8 @@ struct Frame {
 /// Whether `len` is a payload length a frame of this kind can carry.
 constexpr bool valid_length(int len, bool fd) {
   if (len >= 0 && len <= 8) return true;
-  return fd && (len == 12 || len == 16 || len == 20 || len == 24 || len == 32 || len == 48 ||
-                len == 64);
+  return fd &&
+         (len == 12 || len == 16 || len == 20 || len == 24 || len == 32 || len == 48 || len == 64);
 }
 
 using Frames = std::vector<Frame>;

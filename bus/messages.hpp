@@ -34,10 +34,17 @@ inline constexpr int kSpindleNode = 6, kProbeNode = 7, kOvertravelNode = 8;
 constexpr int drive_node(std::size_t axis) { return static_cast<int>(axis) + 1; }
 
 enum class NmtCommand : std::uint8_t {
-  start = 0x01, stop = 0x02, preop = 0x80, reset_node = 0x81, reset_comm = 0x82
+  start = 0x01,
+  stop = 0x02,
+  preop = 0x80,
+  reset_node = 0x81,
+  reset_comm = 0x82
 };
 enum class NmtState : std::uint8_t {
-  boot_up = 0x00, stopped = 0x04, operational = 0x05, pre_operational = 0x7f
+  boot_up = 0x00,
+  stopped = 0x04,
+  operational = 0x05,
+  pre_operational = 0x7f
 };
 
 struct Nmt {
@@ -53,7 +60,7 @@ struct Heartbeat {
 };
 struct Emergency {
   int node = 0;
-  std::uint16_t code = 0;          ///< CiA 301/402 error code
+  std::uint16_t code = 0;  ///< CiA 301/402 error code
   std::uint8_t error_register = 0;
   std::array<std::uint8_t, 5> detail{};
 };
@@ -66,14 +73,17 @@ struct GroupCommand {
     double velocity = 0;  ///< [m/s or rad/s] at that position
   };
   enum class SpindleMode : std::uint8_t {
-    off = 0, clockwise = 1, counter_clockwise = 2, orient = 3
+    off = 0,
+    clockwise = 1,
+    counter_clockwise = 2,
+    orient = 3
   };
-  std::uint16_t tick = 0;          ///< low 16 bits of the tick in which it was sent
-  std::uint16_t controlword = 0;   ///< CiA 402, for the five axes together
+  std::uint16_t tick = 0;         ///< low 16 bits of the tick in which it was sent
+  std::uint16_t controlword = 0;  ///< CiA 402, for the five axes together
   std::array<Setpoint, 5> axes{};
   SpindleMode spindle_mode = SpindleMode::off;
-  std::uint8_t flags = 0;          ///< kSpindleLock, kResetLatch
-  double spindle_speed = 0;        ///< [rad/s]
+  std::uint8_t flags = 0;    ///< kSpindleLock, kResetLatch
+  double spindle_speed = 0;  ///< [rad/s]
 };
 inline constexpr std::uint8_t kSpindleLock = 0x01;  ///< the NC unit asks the spindle drive to lock
 inline constexpr std::uint8_t kResetLatch = 0x02;   ///< operator's reset of latched protection
@@ -81,20 +91,24 @@ inline constexpr std::uint8_t kResetLatch = 0x02;   ///< operator's reset of lat
 struct DriveStatus {
   int node = 0;
   std::uint16_t tick = 0;
-  std::uint16_t statusword = 0;    ///< CiA 402
-  double position = 0;             ///< measured at the end of the cycle [m or rad]; spindle: angle
-  double second_encoder = 0;       ///< load minus motor side [m or rad]; spindle: speed [rad/s]
-  double force = 0;                ///< share of the force limit, -3.2..3.2
+  std::uint16_t statusword = 0;  ///< CiA 402
+  double position = 0;           ///< measured at the end of the cycle [m or rad]; spindle: angle
+  double second_encoder = 0;     ///< load minus motor side [m or rad]; spindle: speed [rad/s]
+  double force = 0;              ///< share of the force limit, -3.2..3.2
 };
 
 struct ProbeSample {
   enum Flag : std::uint16_t {
-    kContact = 0x01, kOutOfRange = 0x02, kSlip = 0x04, kSignalFault = 0x08, kOvertravel = 0x10
+    kContact = 0x01,
+    kOutOfRange = 0x02,
+    kSlip = 0x04,
+    kSignalFault = 0x08,
+    kOvertravel = 0x10
   };
-  std::uint16_t tick = 0;          ///< low 16 bits of the instant the deflection belongs to
+  std::uint16_t tick = 0;  ///< low 16 bits of the instant the deflection belongs to
   std::uint16_t flags = 0;
-  std::array<double, 3> deflection{};      ///< probe frame [m]
-  std::array<std::uint16_t, 6> adc{};      ///< x cos, x sin, y cos, y sin, z cos, z sin
+  std::array<double, 3> deflection{};  ///< probe frame [m]
+  std::array<std::uint16_t, 6> adc{};  ///< x cos, x sin, y cos, y sin, z cos, z sin
 };
 
 struct OvertravelState {
@@ -103,7 +117,7 @@ struct OvertravelState {
   std::uint16_t tick = 0;
   State state = State::normal;
   Cause cause = Cause::none;
-  double deflection = 0;           ///< magnitude when it tripped, else now [m]
+  double deflection = 0;  ///< magnitude when it tripped, else now [m]
 };
 
 // ------------------------------------------------------------------ codecs

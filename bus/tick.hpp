@@ -7,9 +7,9 @@ namespace vcnc {
 
 using Tick = std::int64_t;
 
-inline constexpr double kCycle = 1e-3;            ///< bus cycle [s]
-inline constexpr int kPlantStepsPerCycle = 20;    ///< the plant is integrated at 50 us
-inline constexpr int kLoopStepsPerCycle = 10;     ///< drive loops, probe contact and ADC run at 100 us
+inline constexpr double kCycle = 1e-3;          ///< bus cycle [s]
+inline constexpr int kPlantStepsPerCycle = 20;  ///< the plant is integrated at 50 us
+inline constexpr int kLoopStepsPerCycle = 10;  ///< drive loops, probe contact and ADC run at 100 us
 
 constexpr double seconds(Tick k) { return static_cast<double>(k) * kCycle; }
 

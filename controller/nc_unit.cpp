@@ -20,20 +20,27 @@ cia402::State drive_state(const DriveStatus& status) { return cia402::state_of(s
 /// Controlword that brings the slowest drive one state nearer to operation.
 std::uint16_t bring_up(std::span<const DriveStatus> drives) {
   const auto any = [&](cia402::State s) {
-    return std::any_of(drives.begin(), drives.end(), [&](const DriveStatus& d) { return drive_state(d) == s; });
+    return std::any_of(drives.begin(), drives.end(),
+                       [&](const DriveStatus& d) { return drive_state(d) == s; });
   };
-  if (any(cia402::State::not_ready) || any(cia402::State::switch_on_disabled)) return cia402::kShutdown;
+  if (any(cia402::State::not_ready) || any(cia402::State::switch_on_disabled))
+    return cia402::kShutdown;
   if (any(cia402::State::ready)) return cia402::kSwitchOn;
   return cia402::kEnable;
 }
 
 const char* cause_text(OvertravelState::Cause cause) {
   switch (cause) {
-    case OvertravelState::Cause::range: return "deflection out of the usable range";
-    case OvertravelState::Cause::overtravel: return "the probe's overtravel limit is reached";
-    case OvertravelState::Cause::signal: return "the probe's signals are faulty";
-    case OvertravelState::Cause::silent: return "the probe has fallen silent";
-    case OvertravelState::Cause::none: break;
+    case OvertravelState::Cause::range:
+      return "deflection out of the usable range";
+    case OvertravelState::Cause::overtravel:
+      return "the probe's overtravel limit is reached";
+    case OvertravelState::Cause::signal:
+      return "the probe's signals are faulty";
+    case OvertravelState::Cause::silent:
+      return "the probe has fallen silent";
+    case OvertravelState::Cause::none:
+      break;
   }
   return "no cause given";
 }
@@ -60,7 +67,8 @@ bool NcUnit::step(Tick k, std::span<const Frame> answers, Frames& out) {
   sample(k);
   if (ending_since_ < 0) return true;
   const Tick ended = k - ending_since_;
-  return alarmed_ ? !(ended > kSettleCycles && standing()) && ended < kStopCycles : ended < kSettleCycles;
+  return alarmed_ ? !(ended > kSettleCycles && standing()) && ended < kStopCycles
+                  : ended < kSettleCycles;
 }
 
 void NcUnit::latch(Tick k, std::span<const Frame> answers) {
@@ -97,8 +105,9 @@ void NcUnit::supervise(Tick k) {
   }
   if (machine_.probe.in_spindle && !probe_range_.contains(Vec3(probe_.deflection.data()))) {
     raise(k, Code::probe_range, "NC unit",
-          fmt::format("probe deflection ({:.3f}, {:.3f}, {:.3f}) mm is out of range; spindle locked",
-                      probe_.deflection[0] * 1e3, probe_.deflection[1] * 1e3, probe_.deflection[2] * 1e3));
+          fmt::format(
+              "probe deflection ({:.3f}, {:.3f}, {:.3f}) mm is out of range; spindle locked",
+              probe_.deflection[0] * 1e3, probe_.deflection[1] * 1e3, probe_.deflection[2] * 1e3));
     return;
   }
   if (state_ == NcState::starting) {
@@ -109,7 +118,8 @@ void NcUnit::supervise(Tick k) {
     if (drive_state(measured_next_[i]) == cia402::State::operation_enabled) continue;
     raise(k, Code::drive, i < kAxisCount ? fmt::format("drive {}", kAxisNames[i]) : "drive spindle",
           fmt::format("{} left operation, statusword {:04X}h",
-                      i < kAxisCount ? fmt::format("drive {}", kAxisNames[i]) : std::string("the spindle drive"),
+                      i < kAxisCount ? fmt::format("drive {}", kAxisNames[i])
+                                     : std::string("the spindle drive"),
                       measured_next_[i].statusword));
     return;
   }
@@ -119,14 +129,16 @@ void NcUnit::advance(Tick k) {
   earlier_[1] = earlier_[0];
   earlier_[0] = planned_;
   if (state_ == NcState::starting) {
-    const bool enabled = std::all_of(measured_next_.begin(), measured_next_.end(), [](const DriveStatus& d) {
-      return drive_state(d) == cia402::State::operation_enabled;
-    });
+    const bool enabled = std::all_of(
+        measured_next_.begin(), measured_next_.end(),
+        [](const DriveStatus& d) { return drive_state(d) == cia402::State::operation_enabled; });
     if (enabled) state_ = NcState::running;
   }
   if (state_ == NcState::running || state_ == NcState::dwell) {
     planned_.step = player_.step();
-    state_ = planned_.step.done ? NcState::done : planned_.step.dwell ? NcState::dwell : NcState::running;
+    state_ = planned_.step.done    ? NcState::done
+             : planned_.step.dwell ? NcState::dwell
+                                   : NcState::running;
     if (state_ == NcState::done) {
       ending_since_ = k;
       reason_ = "program end";
@@ -143,9 +155,15 @@ void NcUnit::advance(Tick k) {
 void NcUnit::command(Tick k, Frames& out) {
   GroupCommand command{.tick = low16(k)};
   switch (state_) {
-    case NcState::starting: command.controlword = bring_up(measured_next_); break;
-    case NcState::alarm: command.controlword = cia402::kQuickStop; break;
-    default: command.controlword = cia402::kEnable; break;
+    case NcState::starting:
+      command.controlword = bring_up(measured_next_);
+      break;
+    case NcState::alarm:
+      command.controlword = cia402::kQuickStop;
+      break;
+    default:
+      command.controlword = cia402::kEnable;
+      break;
   }
   for (std::size_t i = 0; i < kAxisCount; ++i)
     command.axes[i] = {planned_.step.position[i], planned_.step.velocity[i]};

@@ -1,12 +1,14 @@
 // The NC unit: brings the drives up, plays the program, watches the probe, samples the machine.
 //
 // It is the bus master. In cycle k, once every module has answered, step() in this order
-//   latch      reads the answers: drive positions at t_k+1, the probe's deflection at t_k, protection state
-//   supervise  stops on a trip, on a faulty drive and - a second path, independent of the overtravel
+//   latch      reads the answers: drive positions at t_k+1, the probe's deflection at t_k,
+//   protection state supervise  stops on a trip, on a faulty drive and - a second path, independent
+//   of the overtravel
 //              module - on a deflection out of range seen by itself
 //   advance    one interpolator cycle: the set-points for t_k+2
 //   command    sends them; the drives act on them in cycle k+1
-//   sample     hands out the telemetry row of instant t_k: command, measured position and deflection
+//   sample     hands out the telemetry row of instant t_k: command, measured position and
+//   deflection
 //              of that same instant (commanded in cycle k-2, measured in k-1, digitised in k)
 #pragma once
 
@@ -40,7 +42,14 @@ class NcUnit : public Master {
     PlayerStep step;
     NcState state = NcState::starting;
   };
-  enum class Code { overtravel = 1001, probe_range = 1002, probe_signal = 1003, drive = 2001, start_up = 2002, node = 3001 };
+  enum class Code {
+    overtravel = 1001,
+    probe_range = 1002,
+    probe_signal = 1003,
+    drive = 2001,
+    start_up = 2002,
+    node = 3001
+  };
 
   void latch(Tick k, std::span<const Frame> answers);
   void supervise(Tick k);

@@ -25,7 +25,7 @@ struct ProgramOptions {
 
   double feed_mm_min = 2000;  ///< of the lap; deg/min where `step` moves a rotary axis
   double approach_feed_mm_min = 300;
-  double tolerance_um = 0.5;          ///< G64 P
+  double tolerance_um = 0.5;        ///< G64 P
   double chord_tolerance_um = 0.1;  ///< of the point list
   std::optional<double> height_mm;  ///< of the ball centre in the workpiece; default: mid-height
   std::optional<double> predeflection_mm;  ///< default: setup.predeflection of the machine

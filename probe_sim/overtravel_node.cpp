@@ -4,7 +4,7 @@ namespace vcnc {
 
 namespace {
 
-constexpr double kWarnShare = 0.8;        ///< of the usable range
+constexpr double kWarnShare = 0.8;  ///< of the usable range
 constexpr int kSilentCyclesAllowed = 2;
 
 Vec3 vec(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
@@ -21,7 +21,8 @@ bool OvertravelNode::accepts(std::uint16_t cob_id) const {
 OvertravelState::Cause OvertravelNode::judge(const ProbeSample& sample) const {
   if (sample.flags & ProbeSample::kOvertravel) return OvertravelState::Cause::overtravel;
   if (sample.flags & ProbeSample::kSignalFault) return OvertravelState::Cause::signal;
-  return range_.contains(vec(sample.deflection)) ? OvertravelState::Cause::none : OvertravelState::Cause::range;
+  return range_.contains(vec(sample.deflection)) ? OvertravelState::Cause::none
+                                                 : OvertravelState::Cause::range;
 }
 
 void OvertravelNode::step(Tick k, std::span<const Frame> inputs, Frames& out) {
@@ -30,7 +31,8 @@ void OvertravelNode::step(Tick k, std::span<const Frame> inputs, Frames& out) {
   std::optional<ProbeSample> sample;
   for (const Frame& frame : inputs) {
     if (auto heard = decode_probe_sample(frame)) sample = heard;
-    if (const auto command = decode_group_command(frame)) reset = (command->flags & kResetLatch) != 0;
+    if (const auto command = decode_group_command(frame))
+      reset = (command->flags & kResetLatch) != 0;
   }
 
   auto cause = OvertravelState::Cause::none;

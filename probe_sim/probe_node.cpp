@@ -16,13 +16,16 @@ AxisVector start_position(const Machine& machine) {
 /// The probe's own protection unit: travel or force beyond its limits in any direction.
 bool overtravelled(const ProbeParams& probe, const Vec3& deflection) {
   const double lateral = deflection.head<2>().norm(), axial = std::abs(deflection.z());
-  return lateral >= std::min(probe.overtravel_lateral, probe.overtravel_force_lateral / probe.spring_rate) ||
-         axial >= std::min(probe.overtravel_axial, probe.overtravel_force_axial / probe.spring_rate);
+  return lateral >= std::min(probe.overtravel_lateral,
+                             probe.overtravel_force_lateral / probe.spring_rate) ||
+         axial >=
+             std::min(probe.overtravel_axial, probe.overtravel_force_axial / probe.spring_rate);
 }
 
 }  // namespace
 
-ProbeNode::ProbeNode(const Machine& machine, std::unique_ptr<Piece> piece, std::uint64_t seed, TruthPort& truth)
+ProbeNode::ProbeNode(const Machine& machine, std::unique_ptr<Piece> piece, std::uint64_t seed,
+                     TruthPort& truth)
     : probe_(machine.probe),
       range_(usable_range(machine.probe)),
       kinematics_(machine.kinematics, machine.probe.length, machine.setup.work_offset[0]),
@@ -34,7 +37,8 @@ ProbeNode::ProbeNode(const Machine& machine, std::unique_ptr<Piece> piece, std::
       truth_(truth),
       start_(start_position(machine)) {}
 
-ToolPose ProbeNode::pose(const std::array<TruthCycle, kTruthAxes>& truth, std::size_t sample) const {
+ToolPose ProbeNode::pose(const std::array<TruthCycle, kTruthAxes>& truth,
+                         std::size_t sample) const {
   AxisVector q;
   for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = truth[i].position[sample];
   return kinematics_.forward(q);

@@ -1,8 +1,9 @@
 // The scanning probe on the bus: contact physics, sin/cos signals, acquisition module.
 //
-// Cycle k: the true axis motion of cycle k-1 comes through the truth channel, ten samples of 100 us. For
-// each of them the stylus ball is moved on the piece (ProbeContact) and the three channels are
-// digitised (SignalChannel). The last sample is the deflection at t_k and goes out as ProbeSample.
+// Cycle k: the true axis motion of cycle k-1 comes through the truth channel, ten samples of 100
+// us. For each of them the stylus ball is moved on the piece (ProbeContact) and the three channels
+// are digitised (SignalChannel). The last sample is the deflection at t_k and goes out as
+// ProbeSample.
 #pragma once
 
 #include <array>
@@ -22,7 +23,8 @@ namespace vcnc {
 class ProbeNode : public Node {
  public:
   /// `piece` may be null: nothing to touch. `truth` outlives the node.
-  ProbeNode(const Machine& machine, std::unique_ptr<Piece> piece, std::uint64_t seed, TruthPort& truth);
+  ProbeNode(const Machine& machine, std::unique_ptr<Piece> piece, std::uint64_t seed,
+            TruthPort& truth);
 
   int id() const override { return kProbeNode; }
   std::string_view name() const override { return "probe"; }

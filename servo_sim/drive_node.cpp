@@ -3,7 +3,8 @@
 namespace vcnc {
 
 static_assert(kLoopStepsPerCycle == std::tuple_size_v<decltype(AxisCycle::truth)>);
-static_assert(kDriveLoopSteps == kLoopStepsPerCycle && kDriveLoopSteps * kPlantStepsPerLoop == kPlantStepsPerCycle);
+static_assert(kDriveLoopSteps == kLoopStepsPerCycle &&
+              kDriveLoopSteps * kPlantStepsPerLoop == kPlantStepsPerCycle);
 
 DriveNode::DriveNode(std::size_t axis, const Machine& machine, TruthPort& truth)
     : axis_(axis),
@@ -39,9 +40,10 @@ void DriveNode::read(std::span<const Frame> inputs, Frames& out) {
   if (state_ == State::operation_enabled && (tripped_ || command_lost || guard_lost)) {
     state_ = State::quick_stop;
     if (!tripped_)  // the trip itself is reported by the overtravel module
-      out.push_back(encode(Emergency{.node = id(),
-                                     .code = static_cast<std::uint16_t>(command_lost ? 0x8250 : 0x8130),
-                                     .error_register = 0x11}));
+      out.push_back(
+          encode(Emergency{.node = id(),
+                           .code = static_cast<std::uint16_t>(command_lost ? 0x8250 : 0x8130),
+                           .error_register = 0x11}));
     return;
   }
   state_ = cia402::next_state(state_, command_.controlword, reset_edge);

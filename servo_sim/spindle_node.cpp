@@ -6,10 +6,14 @@ namespace {
 
 SpindleMode mode_of(GroupCommand::SpindleMode mode) {
   switch (mode) {
-    case GroupCommand::SpindleMode::clockwise: return SpindleMode::clockwise;
-    case GroupCommand::SpindleMode::counter_clockwise: return SpindleMode::counter_clockwise;
-    case GroupCommand::SpindleMode::orient: return SpindleMode::orient;
-    case GroupCommand::SpindleMode::off: break;
+    case GroupCommand::SpindleMode::clockwise:
+      return SpindleMode::clockwise;
+    case GroupCommand::SpindleMode::counter_clockwise:
+      return SpindleMode::counter_clockwise;
+    case GroupCommand::SpindleMode::orient:
+      return SpindleMode::orient;
+    case GroupCommand::SpindleMode::off:
+      break;
   }
   return SpindleMode::off;
 }
@@ -41,8 +45,8 @@ void SpindleNode::step(Tick k, std::span<const Frame> inputs, Frames& out) {
   // The locked spindle stays in operation: it brakes and holds, but takes no mode.
   state_ = cia402::next_state(state_, locked_ ? cia402::kEnable : command_.controlword, false);
   const bool enabled = state_ == cia402::State::operation_enabled && !locked_;
-  const SpindleCycle cycle =
-      drive_.step(enabled ? mode_of(command_.spindle_mode) : SpindleMode::off, command_.spindle_speed);
+  const SpindleCycle cycle = drive_.step(
+      enabled ? mode_of(command_.spindle_mode) : SpindleMode::off, command_.spindle_speed);
 
   std::uint16_t statusword = cia402::statusword_of(state_) | cia402::kRemote;
   if (locked_ || cycle.limited) statusword |= cia402::kInternalLimit;

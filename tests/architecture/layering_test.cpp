@@ -68,7 +68,8 @@ TEST(Layering, DependenciesPointOneWay) {
       if (header.find('/') == std::string::npos || target == source.folder) continue;
       if (std::find(kFolders.begin(), kFolders.end(), target) == kFolders.end()) continue;
       ++checked;
-      EXPECT_TRUE(allowed.at(source.folder).contains(target)) << source.path << " includes " << header;
+      EXPECT_TRUE(allowed.at(source.folder).contains(target))
+          << source.path << " includes " << header;
     }
   }
   EXPECT_GT(checked, 50u);
@@ -76,8 +77,9 @@ TEST(Layering, DependenciesPointOneWay) {
 
 TEST(Layering, OnlySimulatorsSeeTheGroundTruth) {
   for (const Source& source : sources()) {
-    const bool may = source.folder == "servo_sim" || source.folder == "probe_sim" || source.path.starts_with("bus/truth") ||
-                     source.path == "apps/drive_main.cpp" || source.path == "apps/probe_main.cpp" ||
+    const bool may = source.folder == "servo_sim" || source.folder == "probe_sim" ||
+                     source.path.starts_with("bus/truth") || source.path == "apps/drive_main.cpp" ||
+                     source.path == "apps/probe_main.cpp" ||
                      source.path.starts_with("apps/virtual_machine");
     if (may) continue;
     EXPECT_FALSE(includes(source).contains("bus/truth.hpp")) << source.path;
@@ -93,25 +95,33 @@ struct Ban {
 
 TEST(Layering, BannedConstructs) {
   const auto everywhere = [](const Source&) { return true; };
-  const auto cyclic = [](const Source& s) { return s.folder != "apps" && s.folder != "configs" && s.folder != "analysis"; };
+  const auto cyclic = [](const Source& s) {
+    return s.folder != "apps" && s.folder != "configs" && s.folder != "analysis";
+  };
   const std::vector<Ban> bans{
       {"a wall clock outside the pacer",
-       std::regex(R"((steady_clock|system_clock|high_resolution_clock)\s*::|\bclock_gettime\b|\bgettimeofday\b|\bstd::time\b)"),
+       std::regex(
+           R"((steady_clock|system_clock|high_resolution_clock)\s*::|\bclock_gettime\b|\bgettimeofday\b|\bstd::time\b)"),
        [](const Source& s) { return !s.path.starts_with("bus/pacer"); }},
-      {"a sleep outside the pacer", std::regex(R"(\bsleep_for\b|\bsleep_until\b|\bnanosleep\b|\busleep\b)"),
+      {"a sleep outside the pacer",
+       std::regex(R"(\bsleep_for\b|\bsleep_until\b|\bnanosleep\b|\busleep\b)"),
        [](const Source& s) { return !s.path.starts_with("bus/pacer"); }},
       {"a socket outside the transports", std::regex(R"(sys/socket\.h|sys/un\.h|linux/can)"),
        [](const Source& s) { return s.folder != "bus"; }},
-      {"a distribution whose numbers differ between libraries", std::regex(R"(std::\w+_distribution)"), everywhere},
+      {"a distribution whose numbers differ between libraries",
+       std::regex(R"(std::\w+_distribution)"), everywhere},
       {"an engine seeded from outside", std::regex(R"(random_device|\brand\(\))"), everywhere},
       {"unordered iteration in cyclic code", std::regex(R"(unordered_(map|set))"), cyclic},
-      {"DDS outside bus/dds", std::regex(R"(dds/dds\.h)"), [](const Source& s) { return !s.path.starts_with("bus/dds/"); }},
+      {"DDS outside bus/dds", std::regex(R"(dds/dds\.h)"),
+       [](const Source& s) { return !s.path.starts_with("bus/dds/"); }},
       {"HDF5 outside the recording", std::regex(R"(hdf5\.h)"),
        [](const Source& s) { return s.path != "analysis/hdf5_file.hpp"; }},
       {"printing from a library", std::regex(R"(std::(cout|cerr)\b|\bprintf\()"),
        [](const Source& s) { return s.folder != "apps"; }},
       {"a file or a thread in the model", std::regex(R"(<fstream>|<thread>|<mutex>|<filesystem>)"),
-       [](const Source& s) { return s.folder == "model" || s.folder == "servo_sim" || s.folder == "probe_sim"; }},
+       [](const Source& s) {
+         return s.folder == "model" || s.folder == "servo_sim" || s.folder == "probe_sim";
+       }},
   };
   for (const Source& source : sources()) {
     for (const Ban& ban : bans) {
@@ -122,7 +132,8 @@ TEST(Layering, BannedConstructs) {
 }
 
 TEST(Layering, HeavyHeadersStayInOneSourceFile) {
-  const std::map<std::string, std::size_t> limit{{"toml++/toml.h", 1}, {"CLI/CLI.hpp", 3}, {"nlohmann/json.hpp", 1}, {"hdf5.h", 1}};
+  const std::map<std::string, std::size_t> limit{
+      {"toml++/toml.h", 1}, {"CLI/CLI.hpp", 3}, {"nlohmann/json.hpp", 1}, {"hdf5.h", 1}};
   std::map<std::string, std::set<std::string>> users;
   for (const Source& source : sources())
     for (const std::string& header : includes(source)) users[header].insert(source.path);

@@ -1,5 +1,5 @@
-// Telemetry rows over DDS between two processes, free-running and reliable, against ddsperf with samples of
-// the same size on the same machine in the same run.
+// Telemetry rows over DDS between two processes, free-running and reliable, against ddsperf with
+// samples of the same size on the same machine in the same run.
 #include <fmt/format.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -58,10 +58,14 @@ double rows_per_second() {
 /// Samples per second that ddsperf's subscriber reports, median of its seconds.
 double ddsperf() {
   const std::string command = fmt::format(
-      "CYCLONEDDS_URI='<General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces><AllowMulticast>false</AllowMulticast></General>"
-      "<Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer Address=\"127.0.0.1\"/></Peers></Discovery>'; export CYCLONEDDS_URI; "
-      "ddsperf -D 8 sub >/dev/null & ddsperf -D 8 -Qrss:10000 pub size {} 2>/dev/null >/dev/null & ddsperf -D 7 sub 2>/dev/null | "
-      "sed -n 's/.* rate \\([0-9.]*\\) kS.*/\\1/p' | sort -n | awk '{{v[NR]=$1}} END {{print v[int((NR+1)/2)]}}'; wait",
+      "CYCLONEDDS_URI='<General><Interfaces><NetworkInterface "
+      "name=\"lo\"/></Interfaces><AllowMulticast>false</AllowMulticast></General>"
+      "<Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer "
+      "Address=\"127.0.0.1\"/></Peers></Discovery>'; export CYCLONEDDS_URI; "
+      "ddsperf -D 8 sub >/dev/null & ddsperf -D 8 -Qrss:10000 pub size {} 2>/dev/null >/dev/null & "
+      "ddsperf -D 7 sub 2>/dev/null | "
+      "sed -n 's/.* rate \\([0-9.]*\\) kS.*/\\1/p' | sort -n | awk '{{v[NR]=$1}} END {{print "
+      "v[int((NR+1)/2)]}}'; wait",
       sizeof(TelemetryRow));
   FILE* pipe = ::popen(command.c_str(), "r");
   char line[64] = "";
@@ -77,7 +81,9 @@ int main() {
   ::setenv("VCNC_DDS_TAG", fmt::format("vcnc-bench-{}", ::getpid()).c_str(), 1);
   const double rows = vcnc::rows_per_second();
   const double samples = vcnc::ddsperf();
-  fmt::print("telemetry {:.0f} rows/s of {} bytes, nothing lost; ddsperf {:.0f} samples/s of the same size; ratio {:.2f}\n", rows,
-             sizeof(vcnc::TelemetryRow), samples, samples > 0 ? rows / samples : 0.0);
+  fmt::print(
+      "telemetry {:.0f} rows/s of {} bytes, nothing lost; ddsperf {:.0f} samples/s of the same "
+      "size; ratio {:.2f}\n",
+      rows, sizeof(vcnc::TelemetryRow), samples, samples > 0 ? rows / samples : 0.0);
   return rows > 0 ? 0 : 1;
 }

@@ -1,6 +1,6 @@
-// Eight processes in lockstep over the hub, against a bare ping-pong of the same topology in the same
-// run: a master, a forwarding thread and eight client processes that exchange datagrams of the same
-// sizes over AF_UNIX SOCK_SEQPACKET and do nothing else.
+// Eight processes in lockstep over the hub, against a bare ping-pong of the same topology in the
+// same run: a master, a forwarding thread and eight client processes that exchange datagrams of the
+// same sizes over AF_UNIX SOCK_SEQPACKET and do nothing else.
 #include <fmt/format.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
@@ -58,7 +58,8 @@ std::array<int, 2> pair() {
 
 /// Cycles per second of master -> forwarder -> 8 clients -> forwarder -> master.
 double bare_ping_pong() {
-  constexpr std::size_t kToNode = 400, kFromNode = 24, kToMaster = kNodes * kFromNode, kFromMaster = 80;
+  constexpr std::size_t kToNode = 400, kFromNode = 24, kToMaster = kNodes * kFromNode,
+                        kFromMaster = 80;
   const auto master = pair();
   std::array<std::array<int, 2>, kNodes> links{};
   for (auto& link : links) link = pair();
@@ -148,14 +149,17 @@ class Answering : public Node {
 };
 
 double hub(const std::function<void(int id, const std::string& uri)>& node_body) {
-  const std::string path = (std::filesystem::temp_directory_path() / fmt::format("vcnc-bench-{}", ::getpid())).string();
+  const std::string path =
+      (std::filesystem::temp_directory_path() / fmt::format("vcnc-bench-{}", ::getpid())).string();
   std::vector<pid_t> children;
   Hub server(path);
-  for (int id = 1; id <= kNodes; ++id) children.push_back(spawn([&] { node_body(id, server.uri()); }));
+  for (int id = 1; id <= kNodes; ++id)
+    children.push_back(spawn([&] { node_body(id, server.uri()); }));
   Metronome master;
   Pacer pacer;
   const auto bus = open_transport(server.uri(), 0);
-  const MainLoopResult result = run_main_loop(master, *bus, machine_roster(), {.pacer = pacer, .taps = {}});
+  const MainLoopResult result =
+      run_main_loop(master, *bus, machine_roster(), {.pacer = pacer, .taps = {}});
   if (!result.complete) fmt::print("failed: {}\n", result.failure);
   reap(children);
   return master.rate;
@@ -172,7 +176,9 @@ double trivial_nodes() {
 double machine_nodes() {
   const Machine machine = load_machine(configs("machines/trunnion_measured.toml"));
   const auto params = piece_params(machine);
-  const std::string truth_path = (std::filesystem::temp_directory_path() / fmt::format("vcnc-bench-truth-{}", ::getpid())).string();
+  const std::string truth_path =
+      (std::filesystem::temp_directory_path() / fmt::format("vcnc-bench-truth-{}", ::getpid()))
+          .string();
   return hub([&](int id, const std::string& uri) {
     const auto bus = open_transport(uri, id);
     if (id <= static_cast<int>(kAxisCount)) {
@@ -203,13 +209,17 @@ int main() {
     bare[i] = bare_ping_pong();
     trivial[i] = trivial_nodes();
     machine[i] = machine_nodes();
-    fmt::print("bare ping-pong {:6.0f} cycles/s;  hub, trivial nodes {:6.0f} ({:.2f});  hub, machine's modules {:6.0f} ({:.2f})\n", bare[i],
-               trivial[i], trivial[i] / bare[i], machine[i], machine[i] / bare[i]);
+    fmt::print(
+        "bare ping-pong {:6.0f} cycles/s;  hub, trivial nodes {:6.0f} ({:.2f});  hub, machine's "
+        "modules {:6.0f} ({:.2f})\n",
+        bare[i], trivial[i], trivial[i] / bare[i], machine[i], machine[i] / bare[i]);
   }
   const auto median = [](std::array<double, 3> v) {
     std::sort(v.begin(), v.end());
     return v[1];
   };
-  fmt::print("median ratio to the bare ping-pong: trivial nodes {:.2f}, machine's modules {:.2f}  (limit 0.60)\n",
-             median(trivial) / median(bare), median(machine) / median(bare));
+  fmt::print(
+      "median ratio to the bare ping-pong: trivial nodes {:.2f}, machine's modules {:.2f}  (limit "
+      "0.60)\n",
+      median(trivial) / median(bare), median(machine) / median(bare));
 }

@@ -1,5 +1,5 @@
-// The whole machine in one process and thread: simulated over host time, for the ideal and the measured machine,
-// without and with the live analysis. Planning the program is counted separately.
+// The whole machine in one process and thread: simulated over host time, for the ideal and the
+// measured machine, without and with the live analysis. Planning the program is counted separately.
 #include <fmt/format.h>
 
 #include <functional>
@@ -56,7 +56,8 @@ void bench(const char* file) {
       const NcRunResult result = run_nc(machine, options, transport, *s);
       best = std::max(best, seconds(result.end.cycles) / result.end.wall_seconds);
     }
-    fmt::print("{}: {:<20} {:7.1f} x real time  (limit 100, ratio {:.2f})\n", file, what, best, best / 100);
+    fmt::print("{}: {:<20} {:7.1f} x real time  (limit 100, ratio {:.2f})\n", file, what, best,
+               best / 100);
   }
 }
 

@@ -1,5 +1,5 @@
-// Resident memory of a machine that runs for an hour of simulated time, with the live analysis and its
-// recording: printed each simulated minute, and the growth after the first.
+// Resident memory of a machine that runs for an hour of simulated time, with the live analysis and
+// its recording: printed each simulated minute, and the growth after the first.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -30,7 +30,8 @@ class Watcher : public TelemetrySink {
     const double now = resident_mb();
     if (rows_ == 60000) first_ = now;
     last_ = now;
-    if (rows_ % 600000 == 0 || rows_ == 60000) fmt::print("minute {:3d}: {:.1f} MB\n", rows_ / 60000, now);
+    if (rows_ % 600000 == 0 || rows_ == 60000)
+      fmt::print("minute {:3d}: {:.1f} MB\n", rows_ / 60000, now);
   }
   void alarm(const Alarm& alarm) override { session_.alarm(alarm); }
   void end(const RunEnd& end) override { session_.end(end); }
@@ -60,11 +61,13 @@ std::string hour_long_program(const Machine& machine, const Piece& piece) {
 
 int main() {
   using namespace vcnc;
-  const Machine machine = load_machine(configs("machines/trunnion.toml"), {"setup.piece=" + configs("pieces/ring.toml")});
+  const Machine machine = load_machine(configs("machines/trunnion.toml"),
+                                       {"setup.piece=" + configs("pieces/ring.toml")});
   const auto params = piece_params(machine);
   const auto piece = make_piece(*params);
   const TemporaryFile program("hour.ngc", hour_long_program(machine, *piece));
-  const auto folder = std::filesystem::temp_directory_path() / fmt::format("vcnc-bench-hour-{}", ::getpid());
+  const auto folder =
+      std::filesystem::temp_directory_path() / fmt::format("vcnc-bench-hour-{}", ::getpid());
   VirtualMachine modules(machine, params.get(), 1);
   InprocTransport transport(modules.nodes());
   AnalysisSession session({.folder = folder, .report = false, .csv = false});
@@ -74,7 +77,10 @@ int main() {
   options.piece_toml = to_toml(*params);
   const NcRunResult result = run_nc(machine, options, transport, watcher);
   std::filesystem::remove_all(folder);
-  fmt::print("{:.0f} simulated minutes ({}), {:.0f} x real time; memory after the first minute {:.1f} MB, growth since {:+.1f} MB, ratio {:.3f}\n",
-             seconds(result.end.cycles) / 60, result.end.reason, seconds(result.end.cycles) / result.end.wall_seconds, watcher.first(),
-             watcher.growth(), 1 + watcher.growth() / watcher.first());
+  fmt::print(
+      "{:.0f} simulated minutes ({}), {:.0f} x real time; memory after the first minute {:.1f} MB, "
+      "growth since {:+.1f} MB, ratio {:.3f}\n",
+      seconds(result.end.cycles) / 60, result.end.reason,
+      seconds(result.end.cycles) / result.end.wall_seconds, watcher.first(), watcher.growth(),
+      1 + watcher.growth() / watcher.first());
 }

@@ -21,7 +21,9 @@ std::string error_of(const std::function<void()>& f) {
 }
 
 TEST(Config, ValuesInTheKeysUnitBecomeSi) {
-  const Machine m = parse_machine("[axes.X]\nvelocity_mm_s = 250\n[axes.A]\nmax_deg = 90\n[effects.X.backlash]\ngap_um = 10\n", "m");
+  const Machine m = parse_machine(
+      "[axes.X]\nvelocity_mm_s = 250\n[axes.A]\nmax_deg = 90\n[effects.X.backlash]\ngap_um = 10\n",
+      "m");
   EXPECT_DOUBLE_EQ(m.axes[kX].limits.velocity, 0.25);
   EXPECT_DOUBLE_EQ(m.axes[kA].limits.max, kPi / 2);
   EXPECT_DOUBLE_EQ(m.effects.axis[kX].backlash.gap, 10e-6);
@@ -40,7 +42,8 @@ TEST(Config, EveryShippedMachineLoadsWithItsPiece) {
 
 TEST(Config, EveryShippedPieceLoads) {
   std::size_t count = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(std::string(VCNC_SOURCE_DIR) + "/configs/pieces")) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(VCNC_SOURCE_DIR) + "/configs/pieces")) {
     EXPECT_NO_THROW(load_piece(entry.path())) << entry.path();
     ++count;
   }
@@ -48,8 +51,9 @@ TEST(Config, EveryShippedPieceLoads) {
 }
 
 TEST(Config, WritingAndReadingGivesTheSameBits) {
-  Machine m = load_machine(kMachines + "trunnion.toml", {"axes.C.velocity_deg_s=123.456", "effects.A.backlash.gap_arcsec=1.7",
-                                                         "kinematics.a_axis_point_mm=[0.1, 0.2, 0.3]"});
+  Machine m = load_machine(kMachines + "trunnion.toml",
+                           {"axes.C.velocity_deg_s=123.456", "effects.A.backlash.gap_arcsec=1.7",
+                            "kinematics.a_axis_point_mm=[0.1, 0.2, 0.3]"});
   const Machine again = parse_machine(to_toml(m), "again");
   EXPECT_EQ(to_toml(again), to_toml(m));
   EXPECT_EQ(again.axes[kC].limits.velocity, m.axes[kC].limits.velocity);
@@ -61,11 +65,13 @@ TEST(Config, DeclaredMachineHasNoEffects) {
   const Machine m = declared(load_machine(kMachines + "trunnion_measured.toml"));
   EXPECT_EQ(m.effects.axis[kX].friction.coulomb, 0);
   EXPECT_EQ(m.effects.axis[kC].backlash.gap, 0);
-  EXPECT_EQ(m.axes[kX].limits.velocity, load_machine(kMachines + "trunnion_measured.toml").axes[kX].limits.velocity);
+  EXPECT_EQ(m.axes[kX].limits.velocity,
+            load_machine(kMachines + "trunnion_measured.toml").axes[kX].limits.velocity);
 }
 
 TEST(Config, AssignmentsOverrideTheFileInOrder) {
-  const Machine m = load_machine(kMachines + "trunnion.toml", {"axes.Y.kv_per_s=38", "axes.Y.kv_per_s=39", "name=mine"});
+  const Machine m = load_machine(kMachines + "trunnion.toml",
+                                 {"axes.Y.kv_per_s=38", "axes.Y.kv_per_s=39", "name=mine"});
   EXPECT_DOUBLE_EQ(m.axes[kY].servo.kv_per_s, 39);
   EXPECT_EQ(m.name, "mine");
 }
@@ -78,13 +84,15 @@ struct BadCase {
 class BadAssignment : public testing::TestWithParam<BadCase> {};
 
 TEST_P(BadAssignment, IsRefusedWithKeyAndWhatIsAllowed) {
-  const std::string error = error_of([&] { load_machine(kMachines + "trunnion.toml", {GetParam().assignment}); });
+  const std::string error =
+      error_of([&] { load_machine(kMachines + "trunnion.toml", {GetParam().assignment}); });
   EXPECT_NE(error.find(GetParam().message), std::string::npos) << error;
 }
 
 INSTANTIATE_TEST_SUITE_P(
     All, BadAssignment,
-    testing::Values(BadCase{"axes.Y.kv=38", "--set axes.Y.kv=38: axes.Y.kv: unknown key; did you mean kv_per_s?"},
+    testing::Values(BadCase{"axes.Y.kv=38",
+                            "--set axes.Y.kv=38: axes.Y.kv: unknown key; did you mean kv_per_s?"},
                     BadCase{"axes.Y.velocity_m_s=1", "did you mean velocity_mm_s?"},
                     BadCase{"effects.X.backlash.gap_mm=0.01", "did you mean gap_um?"},
                     BadCase{"axes.Y.kv_per_s=fast", "expected a number in per_s"},
@@ -92,11 +100,13 @@ INSTANTIATE_TEST_SUITE_P(
                     BadCase{"axes.Y.kv_per_s=nan", "expected a finite number"},
                     BadCase{"axes.Y.kv_per_s=-1", "-1 is out of range, allowed 0.1 .. 1000 per_s"},
                     BadCase{"kinematics.type=hexapod", "expected one of \"trunnion\", \"head\""},
-                    BadCase{"axes.W.kv_per_s=2", "axes.W: unknown key; allowed here: A, C, X, Y, Z"},
+                    BadCase{"axes.W.kv_per_s=2",
+                            "axes.W: unknown key; allowed here: A, C, X, Y, Z"},
                     BadCase{"setup.g54_mm=[1,2]", "expected 3 numbers, found 2"},
                     BadCase{"probe.in_spindle=1", "expected true or false"},
                     BadCase{"probe.adc_bits=12.5", "expected a whole number"},
-                    BadCase{"probe.adc_bits=14", "allowed 12 or 16"}, BadCase{"axes=3", "axes: expected a table"},
+                    BadCase{"probe.adc_bits=14", "allowed 12 or 16"},
+                    BadCase{"axes=3", "axes: expected a table"},
                     BadCase{"axes.X.min_mm=900", "lower travel limit must be below"},
                     BadCase{"axes.X.start_mm=401", "start position is outside"},
                     BadCase{"setup.predeflection_mm=2.5", "must be below probe.range_mm"},
@@ -106,14 +116,17 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(Config, MessagesNameFileAndLine) {
   EXPECT_EQ(error_of([] { parse_machine("name = \"a\"\n[axes.X]\nkv = 3\n", "m.toml"); }),
             "m.toml:3: axes.X.kv: unknown key; did you mean kv_per_s?");
-  EXPECT_EQ(error_of([] { parse_machine("[axes.X]\nmin_mm = 3 mm\n", "m.toml"); }).substr(0, 9), "m.toml:2:");
-  EXPECT_EQ(error_of([] { load_machine("/no/such/file.toml"); }), "/no/such/file.toml: cannot be opened");
+  EXPECT_EQ(error_of([] { parse_machine("[axes.X]\nmin_mm = 3 mm\n", "m.toml"); }).substr(0, 9),
+            "m.toml:2:");
+  EXPECT_EQ(error_of([] { load_machine("/no/such/file.toml"); }),
+            "/no/such/file.toml: cannot be opened");
   EXPECT_NE(error_of([] { load_machine("/"); }).find("is a directory"), std::string::npos);
 }
 
 TEST(Config, PathsAreRelativeToTheirSource) {
   const Machine from_file = load_machine(kMachines + "trunnion.toml");
-  EXPECT_EQ(from_file.setup.piece, std::filesystem::weakly_canonical(kMachines + "../pieces/s_eq1.toml"));
+  EXPECT_EQ(from_file.setup.piece,
+            std::filesystem::weakly_canonical(kMachines + "../pieces/s_eq1.toml"));
   const Machine from_here = load_machine(kMachines + "trunnion.toml", {"setup.piece=ring.toml"});
   EXPECT_EQ(from_here.setup.piece, (std::filesystem::current_path() / "ring.toml").string());
 }

@@ -44,17 +44,22 @@ class Keeper : public TelemetrySink {
   std::optional<Evaluation> evaluation_;
 };
 
-inline std::string configs(const std::string& file) { return std::string(VCNC_SOURCE_DIR) + "/configs/" + file; }
+inline std::string configs(const std::string& file) {
+  return std::string(VCNC_SOURCE_DIR) + "/configs/" + file;
+}
 
 inline std::unique_ptr<PieceParams> piece_params(const Machine& machine) {
-  return machine.setup.piece.empty() ? nullptr : std::make_unique<PieceParams>(load_piece(machine.setup.piece));
+  return machine.setup.piece.empty()
+             ? nullptr
+             : std::make_unique<PieceParams>(load_piece(machine.setup.piece));
 }
 
 /// A file that is gone when the test is over.
 class TemporaryFile {
  public:
   TemporaryFile(const std::string& name, const std::string& text)
-      : path_(std::filesystem::temp_directory_path() / ("vcnc-test-" + std::to_string(::getpid()) + "-" + name)) {
+      : path_(std::filesystem::temp_directory_path() /
+              ("vcnc-test-" + std::to_string(::getpid()) + "-" + name)) {
     std::ofstream(path_) << text;
   }
   ~TemporaryFile() { std::filesystem::remove(path_); }

@@ -32,7 +32,8 @@ TEST_P(IdealMachine, MeasuresNothingButWhatThePlannerPlanned) {
   EXPECT_GE(lap.e_rest.min, -0.5 * um);
   double worst = 0;
   for (const ErrorSample& e : run.errors)
-    if (e.near_piece && e.contact == Contact::ok && std::abs(e.e_plan) < 3 * um) worst = std::max(worst, std::abs(e.e_n - e.e_plan));
+    if (e.near_piece && e.contact == Contact::ok && std::abs(e.e_plan) < 3 * um)
+      worst = std::max(worst, std::abs(e.e_n - e.e_plan));
   EXPECT_LE(worst, 0.5 * um);
   EXPECT_LE(lap.e_plan.max, 2.5 * um);  // chord 0.2 um and blending 2 um
   EXPECT_EQ(run.summary.coverage_percent, 100);
@@ -41,7 +42,8 @@ TEST_P(IdealMachine, MeasuresNothingButWhatThePlannerPlanned) {
   EXPECT_LE(run.nc.end.bus_load_worst, 0.85);
 }
 
-INSTANTIATE_TEST_SUITE_P(BothKinematics, IdealMachine, testing::Values("machines/trunnion.toml", "machines/head.toml"));
+INSTANTIATE_TEST_SUITE_P(BothKinematics, IdealMachine,
+                         testing::Values("machines/trunnion.toml", "machines/head.toml"));
 
 /// The steady full circle of a circular test: dR(phi) seen by the probe, one value per cycle.
 struct Circle {
@@ -51,7 +53,9 @@ struct Circle {
     for (double v : dr) sum += v;
     return sum / static_cast<double>(dr.size());
   }
-  double peak_to_peak() const { return *std::max_element(dr.begin(), dr.end()) - *std::min_element(dr.begin(), dr.end()); }
+  double peak_to_peak() const {
+    return *std::max_element(dr.begin(), dr.end()) - *std::min_element(dr.begin(), dr.end());
+  }
   /// Mean of dR over [from, to] degrees.
   double between(double from, double to) const {
     double sum = 0;
@@ -63,7 +67,8 @@ struct Circle {
     return sum / n;
   }
   double angle_of_max() const {
-    return phi[static_cast<std::size_t>(std::max_element(dr.begin(), dr.end()) - dr.begin())] / kDegree;
+    return phi[static_cast<std::size_t>(std::max_element(dr.begin(), dr.end()) - dr.begin())] /
+           kDegree;
   }
 };
 
@@ -131,9 +136,14 @@ TEST(CircularTest, MismatchOfGainsDrawsAnEllipseThatTurnsWithTheDirection) {
 }
 
 TEST(CircularTest, BacklashStepsWhereItsAxisReverses) {
-  // Without friction the load would lie at the side its inertia pushes it to, not the one it is dragged to.
-  const Circle c = circle({"axes.X.feedback=motor", "effects.X.backlash.gap_um=10", "effects.X.friction.coulomb_N=100"}, 2000);
-  const auto step = [&](double at) { return c.between(at + 1, at + 4) - c.between(at - 4, at - 1); };
+  // Without friction the load would lie at the side its inertia pushes it to, not the one it is
+  // dragged to.
+  const Circle c = circle(
+      {"axes.X.feedback=motor", "effects.X.backlash.gap_um=10", "effects.X.friction.coulomb_N=100"},
+      2000);
+  const auto step = [&](double at) {
+    return c.between(at + 1, at + 4) - c.between(at - 4, at - 1);
+  };
   // X turns round at 0 and 180 degrees: the table is left behind by the gap, inwards before and
   // outwards after the reversal.
   EXPECT_NEAR(c.between(1, 4) - c.between(-4, -1), 10 * um, 0.5 * um);
@@ -169,8 +179,10 @@ Outcome crash(double feed_mm_min) {
   plane.centre = {0.1, 0, 0};
   plane.direction = Vec3::UnitX();
   const TemporaryFile piece("plane.toml", to_toml(plane));
-  Machine machine = load_machine(configs("machines/trunnion.toml"), {"setup.piece=" + piece.path(), "axes.X.start_mm=200"});
-  return play(machine, "G90 G21 G54\nM19\nG43 H1\nG0 X130 Y0 Z100\nG1 X90 F" + std::to_string(feed_mm_min) + "\nM30\n");
+  Machine machine = load_machine(configs("machines/trunnion.toml"),
+                                 {"setup.piece=" + piece.path(), "axes.X.start_mm=200"});
+  return play(machine, "G90 G21 G54\nM19\nG43 H1\nG0 X130 Y0 Z100\nG1 X90 F" +
+                           std::to_string(feed_mm_min) + "\nM30\n");
 }
 
 TEST(Overtravel, StopsTheAxesLocksTheSpindleAndSaysSo) {
@@ -179,7 +191,8 @@ TEST(Overtravel, StopsTheAxesLocksTheSpindleAndSaysSo) {
   EXPECT_TRUE(run.nc.alarmed);
   EXPECT_EQ(run.nc.exit_code(), 3) << run.nc.end.reason;
   ASSERT_FALSE(run.summary.alarms.empty());
-  EXPECT_TRUE(std::any_of(run.summary.alarms.begin(), run.summary.alarms.end(), [](const Alarm& a) { return a.code == 1001 || a.code == 1002; }));
+  EXPECT_TRUE(std::any_of(run.summary.alarms.begin(), run.summary.alarms.end(),
+                          [](const Alarm& a) { return a.code == 1001 || a.code == 1002; }));
   EXPECT_EQ(run.rows.back().state, static_cast<double>(NcState::alarm));
 
   // At rest well before the 18 mm of the mechanism, and within v^2/2a of the trip.
@@ -197,7 +210,8 @@ TEST(Overtravel, TheTripReachesTheDrivesWithinTwoCycles) {
   for (std::size_t i = 1; i < run.rows.size(); ++i) {
     if (out_of_range < 0 && run.rows[i].deflection[0] > 2.0e-3) out_of_range = static_cast<Tick>(i);
     const double v = (run.rows[i].q_act[kX] - run.rows[i - 1].q_act[kX]) / kCycle;
-    if (out_of_range > 0 && braking < 0 && std::abs(v) < 0.98 * 2000 / 60e3) braking = static_cast<Tick>(i);
+    if (out_of_range > 0 && braking < 0 && std::abs(v) < 0.98 * 2000 / 60e3)
+      braking = static_cast<Tick>(i);
   }
   ASSERT_GT(out_of_range, 0);
   // The sample is told in cycle k, judged in k+1, acted upon in k+2.
@@ -212,7 +226,8 @@ TEST(Overtravel, TheNcUnitsOwnCheckStopsItWhenTheModuleIsBlind) {
   plane.centre = {0.1, 0, 0};
   plane.direction = Vec3::UnitX();
   const TemporaryFile piece_file("plane2.toml", to_toml(plane));
-  const Machine machine = load_machine(configs("machines/trunnion.toml"), {"setup.piece=" + piece_file.path(), "axes.X.start_mm=200"});
+  const Machine machine = load_machine(configs("machines/trunnion.toml"),
+                                       {"setup.piece=" + piece_file.path(), "axes.X.start_mm=200"});
   Machine blind = machine;
   blind.probe.in_spindle = false;
   VirtualMachine modules(machine, &plane, 1), blind_modules(blind, &plane, 1);
@@ -221,7 +236,8 @@ TEST(Overtravel, TheNcUnitsOwnCheckStopsItWhenTheModuleIsBlind) {
   ASSERT_EQ(nodes.back()->id(), kOvertravelNode);
   InprocTransport transport(nodes);
   Keeper keeper;
-  const TemporaryFile program("crash.ngc", "G90 G21\nM19\nG43 H1\nG0 X130 Y0 Z100\nG1 X90 F1000\nM30\n");
+  const TemporaryFile program("crash.ngc",
+                              "G90 G21\nM19\nG43 H1\nG0 X130 Y0 Z100\nG1 X90 F1000\nM30\n");
   NcRunOptions options;
   options.program = program.path();
   options.piece_toml = to_toml(plane);

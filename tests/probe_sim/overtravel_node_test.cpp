@@ -13,7 +13,8 @@ class OvertravelNodeTest : public testing::Test {
   OvertravelState hear(double x_mm, std::uint16_t flags = 0, bool reset = false) {
     GroupCommand command;
     if (reset) command.flags = kResetLatch;
-    const Frames inputs{encode(ProbeSample{.flags = flags, .deflection = {x_mm * 1e-3, 0, 0}}), encode(command)};
+    const Frames inputs{encode(ProbeSample{.flags = flags, .deflection = {x_mm * 1e-3, 0, 0}}),
+                        encode(command)};
     return step(inputs);
   }
   OvertravelState step(const Frames& inputs) {

@@ -33,7 +33,9 @@ inline std::string read_text(const std::string& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-inline void write_text(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+inline void write_text(const std::string& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary) << text;
+}
 
 inline std::uintmax_t size_of(const std::string& path) {
   std::error_code error;
@@ -49,11 +51,16 @@ struct Said {
 inline Said shell(const Scratch& scratch, const std::string& command) {
   const std::string out = scratch / "stdout", err = scratch / "stderr";
   const int status = std::system((command + " >" + out + " 2>" + err + " </dev/null").c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_text(out), read_text(err)};
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_text(out),
+          read_text(err)};
 }
 
-inline std::string bin(const std::string& program) { return std::string(VCNC_BIN_DIR) + "/" + program; }
-inline std::string configs(const std::string& file) { return std::string(VCNC_SOURCE_DIR) + "/configs/" + file; }
+inline std::string bin(const std::string& program) {
+  return std::string(VCNC_BIN_DIR) + "/" + program;
+}
+inline std::string configs(const std::string& file) {
+  return std::string(VCNC_SOURCE_DIR) + "/configs/" + file;
+}
 
 /// Value of a key of a flat JSON text, as text.
 inline std::string json_value(const std::string& json, const std::string& key) {

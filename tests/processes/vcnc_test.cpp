@@ -20,7 +20,8 @@ const std::string kMachine = configs("machines/trunnion_measured.toml");
 std::string short_program() {
   return "%\n(short)\nG54 G90 G17 G21 G94 G40 G49\nG64 P0.01\nM19\nG0 A7.88 C173.92\nG43.4 H1\n"
          "G0 X115.4 Y38.43 Z79\nG0 Z20\nG1 X110.8 Y35.44 F1000\n"
-         "G1 X106.54 Y41.23 A8.245 C176.62 F1500\nG1 X110.8 Y35.44 A7.88 C173.92\nG1 X115.4 Y38.43\n"
+         "G1 X106.54 Y41.23 A8.245 C176.62 F1500\nG1 X110.8 Y35.44 A7.88 C173.92\nG1 X115.4 "
+         "Y38.43\n"
          "G0 Z79\nG49\nM30\n%\n";
 }
 
@@ -29,13 +30,18 @@ class Vcnc : public testing::Test {
   Vcnc() { write_text(scratch_ / "short.ngc", short_program()); }
 
   Said run(const std::string& out, const std::string& options) {
-    return shell(scratch_, bin("vcnc") + " run " + (scratch_ / "short.ngc") + " --machine " + kMachine + " --no-report --out " +
-                               (scratch_ / out) + " " + options);
+    return shell(scratch_, bin("vcnc") + " run " + (scratch_ / "short.ngc") + " --machine " +
+                               kMachine + " --no-report --out " + (scratch_ / out) + " " + options);
   }
-  std::string hash(const std::string& out) { return json_value(read_text(scratch_ / (out + "/summary.json")), "trace_hash"); }
+  std::string hash(const std::string& out) {
+    return json_value(read_text(scratch_ / (out + "/summary.json")), "trace_hash");
+  }
 
   /// Processes that still mention this test's folder on their command line.
-  std::string leftovers() { return shell(scratch_, "pgrep -af " + (scratch_ / "") + " | grep -v pgrep | grep -v 'sh -c'").out; }
+  std::string leftovers() {
+    return shell(scratch_, "pgrep -af " + (scratch_ / "") + " | grep -v pgrep | grep -v 'sh -c'")
+        .out;
+  }
 
   Scratch scratch_;
 };
@@ -62,22 +68,28 @@ TEST_F(Vcnc, StartOrderAndHostDelaysDoNotChangeTheHash) {
   const std::string machine = scratch_ / "reference/machine.toml";
   std::mt19937 random(7);
   for (int round = 0; round < 2; ++round) {
-    const std::string bus = scratch_ / ("bus" + std::to_string(round)), truth = scratch_ / ("truth" + std::to_string(round));
+    const std::string bus = scratch_ / ("bus" + std::to_string(round)),
+                      truth = scratch_ / ("truth" + std::to_string(round));
     const std::string out = "round" + std::to_string(round);
     ::setenv("VCNC_DDS_TAG", ("vcnc-test-" + std::to_string(::getpid()) + out).c_str(), 1);
     Hub hub(bus);
     std::vector<std::pair<std::string, std::vector<std::string>>> modules;
     for (const char* axis : {"X", "Y", "Z", "A", "C", "spindle"})
       modules.push_back({std::string("drive ") + axis,
-                         {bin("vcnc-drive"), "--machine", machine, "--bus", "hub://" + bus, "--truth", truth, "--axis", axis}});
-    modules.push_back({"probe", {bin("vcnc-probe"), "--machine", machine, "--bus", "hub://" + bus, "--truth", truth, "--seed", "1"}});
-    modules.push_back({"overtravel", {bin("vcnc-overtravel"), "--machine", machine, "--bus", "hub://" + bus}});
+                         {bin("vcnc-drive"), "--machine", machine, "--bus", "hub://" + bus,
+                          "--truth", truth, "--axis", axis}});
+    modules.push_back({"probe",
+                       {bin("vcnc-probe"), "--machine", machine, "--bus", "hub://" + bus, "--truth",
+                        truth, "--seed", "1"}});
+    modules.push_back(
+        {"overtravel", {bin("vcnc-overtravel"), "--machine", machine, "--bus", "hub://" + bus}});
     modules.push_back({"analysis", {bin("vcnc-analysis"), "--out", scratch_ / out, "--no-report"}});
     std::shuffle(modules.begin(), modules.end(), random);
     Launcher launcher;
     for (const auto& [name, argv] : modules) launcher.start(name, argv);
     launcher.wait_all_ready(30000);
-    launcher.start("NC unit", {bin("vcnc-nc"), "--machine", machine, "--program", scratch_ / "short.ngc", "--bus", "hub://" + bus});
+    launcher.start("NC unit", {bin("vcnc-nc"), "--machine", machine, "--program",
+                               scratch_ / "short.ngc", "--bus", "hub://" + bus});
     while (launcher.running() > 0) {
       const auto& victim = modules[random() % modules.size()].first;
       launcher.signal(victim, SIGSTOP);
@@ -93,7 +105,8 @@ TEST_F(Vcnc, StartOrderAndHostDelaysDoNotChangeTheHash) {
 
 TEST_F(Vcnc, AnalyzeGivesTheNumbersOfTheLiveRun) {
   ASSERT_EQ(run("live", "").code, 0);
-  const Said said = shell(scratch_, bin("vcnc") + " analyze " + (scratch_ / "live") + " --out " + (scratch_ / "again"));
+  const Said said = shell(
+      scratch_, bin("vcnc") + " analyze " + (scratch_ / "live") + " --out " + (scratch_ / "again"));
   ASSERT_EQ(said.code, 0) << said.err;
   EXPECT_EQ(read_text(scratch_ / "live/summary.json"), read_text(scratch_ / "again/summary.json"));
 }
@@ -108,8 +121,9 @@ class RunningMachine : public Vcnc {
       const int err = ::open((scratch_ / "err").c_str(), O_CREAT | O_WRONLY, 0600);
       ::dup2(err, 2);
       ::dup2(::open("/dev/null", O_WRONLY), 1);
-      ::execl(bin("vcnc").c_str(), "vcnc", "run", (scratch_ / "long.ngc").c_str(), "--machine", kMachine.c_str(), "--pace", "2",
-              "--no-report", "--out", (scratch_ / "run").c_str(), nullptr);
+      ::execl(bin("vcnc").c_str(), "vcnc", "run", (scratch_ / "long.ngc").c_str(), "--machine",
+              kMachine.c_str(), "--pace", "2", "--no-report", "--out", (scratch_ / "run").c_str(),
+              nullptr);
       ::_exit(127);
     }
     for (int i = 0; i < 200 && size_of(scratch_ / "run/recording.h5.partial") < 500000; ++i)
@@ -152,14 +166,16 @@ TEST_F(RunningMachine, CtrlCEndsInOrder) {
   ::kill(child_, SIGINT);
   EXPECT_EQ(wait(), 130);
   EXPECT_EQ(leftovers(), "");
-  EXPECT_NE(read_text(scratch_ / "run/summary.json").find("stopped by the operator"), std::string::npos);
+  EXPECT_NE(read_text(scratch_ / "run/summary.json").find("stopped by the operator"),
+            std::string::npos);
 }
 
 TEST_F(RunningMachine, AKilledLauncherLeavesNoOrphans) {
   start();
   ::kill(child_, SIGKILL);
   wait();
-  for (int i = 0; i < 100 && !leftovers().empty(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  for (int i = 0; i < 100 && !leftovers().empty(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
   EXPECT_EQ(leftovers(), "");
 }
 
@@ -167,7 +183,7 @@ TEST_F(RunningMachine, AKilledLauncherLeavesNoOrphans) {
 
 struct BadInput {
   const char* name;
-  const char* options;   ///< instead of the good ones; {S} is the scratch folder
+  const char* options;  ///< instead of the good ones; {S} is the scratch folder
   int code;
   const char* message;
 };
@@ -178,13 +194,19 @@ TEST_P(BadRun, IsOneClearErrorAndLeavesNothing) {
   write_text(scratch_ / "error.ngc", "G90 G21\nG1 X1 F100\nG1 Y2\nG12.7 X3\nM30\n");
   write_text(scratch_ / "far.ngc", "G90 G21\nG0 X0\nG1 X4000 F1000\nM30\n");
   write_text(scratch_ / "bad.toml", "name = \"x\"\n[axes.X]\nvelocity_m_s = 1\n");
-  write_text(scratch_ / "surface.toml", "kind = \"ruled\"\ndegree = 3\nknots = [0, 0, 1, 1]\nbottom_mm = [[0,0,0],[1,0,0]]\ntop_mm = [[0,0,9],[1,0,9]]\n");
+  write_text(scratch_ / "surface.toml",
+             "kind = \"ruled\"\ndegree = 3\nknots = [0, 0, 1, 1]\nbottom_mm = "
+             "[[0,0,0],[1,0,0]]\ntop_mm = [[0,0,9],[1,0,9]]\n");
   fs::create_directory(scratch_ / "mine");
   write_text(scratch_ / "mine/thesis.tex", "precious");
-  const std::string good = (scratch_ / "short.ngc") + " --machine " + kMachine + " --out " + (scratch_ / "out");
+  const std::string good =
+      (scratch_ / "short.ngc") + " --machine " + kMachine + " --out " + (scratch_ / "out");
   std::string options = GetParam().options;
-  for (const auto& [mark, value] : {std::pair<std::string, std::string>{"{S}", scratch_ / ""}, {"{M}", kMachine}, {"{GOOD}", good}})
-    for (std::size_t at; (at = options.find(mark)) != std::string::npos;) options.replace(at, mark.size(), value);
+  for (const auto& [mark, value] : {std::pair<std::string, std::string>{"{S}", scratch_ / ""},
+                                    {"{M}", kMachine},
+                                    {"{GOOD}", good}})
+    for (std::size_t at; (at = options.find(mark)) != std::string::npos;)
+      options.replace(at, mark.size(), value);
   const Said said = shell(scratch_, bin("vcnc") + " run " + options);
   EXPECT_EQ(said.code, GetParam().code) << said.err;
   EXPECT_NE(said.err.find(GetParam().message), std::string::npos) << said.err;
@@ -198,22 +220,27 @@ INSTANTIATE_TEST_SUITE_P(
     All, BadRun,
     testing::Values(
         BadInput{"UnknownKey", "{GOOD} --set axes.X.speed=3", 2, "axes.X.speed: unknown key"},
-        BadInput{"WrongUnit", "{S}short.ngc --machine {S}bad.toml --out {S}out", 2, "bad.toml:3: axes.X.velocity_m_s: unknown key; did you mean velocity_mm_s?"},
+        BadInput{"WrongUnit", "{S}short.ngc --machine {S}bad.toml --out {S}out", 2,
+                 "bad.toml:3: axes.X.velocity_m_s: unknown key; did you mean velocity_mm_s?"},
         BadInput{"OutOfRange", "{GOOD} --set axes.X.kv_per_s=-4", 2, "allowed 0.1 .. 1000 per_s"},
-        BadInput{"NoMachine", "{S}short.ngc --machine {S}none.toml --out {S}out", 2, "none.toml: cannot be opened"},
+        BadInput{"NoMachine", "{S}short.ngc --machine {S}none.toml --out {S}out", 2,
+                 "none.toml: cannot be opened"},
         BadInput{"NoProgram", "{S}none.ngc --machine {M} --out {S}out", 2, "none.ngc"},
         BadInput{"ErrorInTheMiddle", "{S}error.ngc --machine {M} --out {S}out", 2, "error.ngc:4: "},
         BadInput{"AxisLimit", "{S}far.ngc --machine {M} --out {S}out", 2, "far.ngc:3: "},
-        BadInput{"NoPiece", "{GOOD} --set setup.piece={S}none.toml", 2, "none.toml: cannot be opened"},
+        BadInput{"NoPiece", "{GOOD} --set setup.piece={S}none.toml", 2,
+                 "none.toml: cannot be opened"},
         BadInput{"BadSurface", "{GOOD} --set setup.piece={S}surface.toml", 2, "surface.toml: "},
         BadInput{"NoBus", "{GOOD} --bus can://nosuchcan0", 1, "nosuchcan0"},
         BadInput{"UnknownBus", "{GOOD} --bus smoke://signals", 1, "smoke"},
         BadInput{"Pace", "{GOOD} --pace fast", 2, "expected free or a factor of real time"},
-        BadInput{"ForeignFolder", "{S}short.ngc --machine {M} --out {S}mine", 2, "holds other files"}),
+        BadInput{"ForeignFolder", "{S}short.ngc --machine {M} --out {S}mine", 2,
+                 "holds other files"}),
     [](const auto& test) { return test.param.name; });
 
 TEST_F(Vcnc, EveryProgramExplainsItself) {
-  for (const char* program : {"vcnc", "vcnc-nc", "vcnc-drive", "vcnc-probe", "vcnc-overtravel", "vcnc-analysis"}) {
+  for (const char* program :
+       {"vcnc", "vcnc-nc", "vcnc-drive", "vcnc-probe", "vcnc-overtravel", "vcnc-analysis"}) {
     const Said help = shell(scratch_, bin(program) + " --help");
     EXPECT_EQ(help.code, 0) << program;
     EXPECT_GT(help.out.size(), 100u) << program;
@@ -225,10 +252,12 @@ TEST_F(Vcnc, ProgramsOfEveryKindRunOnBothKinematics) {
   for (const std::string machine : {"trunnion", "head"}) {
     const auto generate_and_run = [&](const std::string& kind, const std::string& piece) {
       const std::string file = scratch_ / (kind.substr(0, kind.find(' ')) + ".ngc");
-      const std::string on = " --machine " + configs("machines/" + machine + ".toml") + " --set setup.piece=" + configs("pieces/" + piece);
+      const std::string on = " --machine " + configs("machines/" + machine + ".toml") +
+                             " --set setup.piece=" + configs("pieces/" + piece);
       Said said = shell(scratch_, bin("vcnc") + " program " + kind + on + " --out " + file);
       ASSERT_EQ(said.code, 0) << machine << " " << kind << ": " << said.err;
-      said = shell(scratch_, bin("vcnc") + " run " + file + on + " --in-process --no-report --out " + (scratch_ / "run"));
+      said = shell(scratch_, bin("vcnc") + " run " + file + on +
+                                 " --in-process --no-report --out " + (scratch_ / "run"));
       EXPECT_EQ(said.code, 0) << machine << " " << kind << ": " << said.err << said.out;
     };
     generate_and_run("s-piece --feed-mm-min 3000", "s_eq1.toml");

@@ -12,7 +12,8 @@ class DriveNodeTest : public testing::Test {
  protected:
   DriveNodeTest() : truth_(open_local_truth()), node_(kX, machine_, *truth_) {}
 
-  DriveStatus cycle(std::uint16_t controlword, double position = 0, bool tripped = false, bool command = true) {
+  DriveStatus cycle(std::uint16_t controlword, double position = 0, bool tripped = false,
+                    bool command = true) {
     Frames inputs, out;
     OvertravelState guard;
     if (tripped) guard.state = OvertravelState::State::tripped;
@@ -28,7 +29,9 @@ class DriveNodeTest : public testing::Test {
     return decode_drive_status(out.at(0)).value();
   }
   void enable() {
-    for (std::uint16_t cw : {cia402::kShutdown, cia402::kShutdown, cia402::kSwitchOn, cia402::kEnable, cia402::kEnable}) cycle(cw);
+    for (std::uint16_t cw : {cia402::kShutdown, cia402::kShutdown, cia402::kSwitchOn,
+                             cia402::kEnable, cia402::kEnable})
+      cycle(cw);
   }
 
   Machine machine_;
@@ -66,7 +69,8 @@ TEST_F(DriveNodeTest, ATripStopsItInTheCycleAfterTheMessage) {
   EXPECT_EQ(cia402::state_of(status.statusword), cia402::State::quick_stop);
   double last = status.position;
   for (int i = 0; i < 200; ++i) last = cycle(cia402::kEnable, 1, true).position;
-  EXPECT_NEAR(cycle(cia402::kEnable, 1, true).position, last, 1e-9);  // at rest, whatever is commanded
+  EXPECT_NEAR(cycle(cia402::kEnable, 1, true).position, last,
+              1e-9);  // at rest, whatever is commanded
   EXPECT_LT(last, 2e-3);
   EXPECT_EQ(emergencies_, 0);  // the module that tripped reports it
 }
@@ -75,7 +79,8 @@ TEST_F(DriveNodeTest, StopsWithAnEmergencyWhenTheCommandIsLost) {
   enable();
   for (int i = 0; i < 20; ++i) cycle(cia402::kEnable, 0);
   for (int i = 0; i < kSilentCyclesAllowed; ++i)
-    EXPECT_EQ(cia402::state_of(cycle(0, 0, false, false).statusword), cia402::State::operation_enabled);
+    EXPECT_EQ(cia402::state_of(cycle(0, 0, false, false).statusword),
+              cia402::State::operation_enabled);
   EXPECT_EQ(cia402::state_of(cycle(0, 0, false, false).statusword), cia402::State::quick_stop);
   EXPECT_EQ(emergencies_, 1);
 }
@@ -90,7 +95,8 @@ TEST_F(DriveNodeTest, StopsWhenTheOvertravelModuleFallsSilent) {
     out.clear();
     node_.step(k_++, only_command, out);
   }
-  EXPECT_EQ(cia402::state_of(decode_drive_status(out.at(0))->statusword), cia402::State::quick_stop);
+  EXPECT_EQ(cia402::state_of(decode_drive_status(out.at(0))->statusword),
+            cia402::State::quick_stop);
   EXPECT_EQ(decode_emergency(out.at(1))->code, 0x8130);
 }
 

@@ -7,7 +7,8 @@ namespace {
 
 class SpindleNodeTest : public testing::Test {
  protected:
-  DriveStatus cycle(GroupCommand::SpindleMode mode, bool tripped = false, std::uint8_t flags = 0, std::uint16_t cw = cia402::kEnable) {
+  DriveStatus cycle(GroupCommand::SpindleMode mode, bool tripped = false, std::uint8_t flags = 0,
+                    std::uint16_t cw = cia402::kEnable) {
     GroupCommand c;
     c.controlword = cw;
     c.spindle_mode = mode;
@@ -21,11 +22,13 @@ class SpindleNodeTest : public testing::Test {
     return decode_drive_status(out.at(0)).value();
   }
   void enable() {
-    for (std::uint16_t cw : {cia402::kShutdown, cia402::kShutdown, cia402::kSwitchOn}) cycle(GroupCommand::SpindleMode::off, false, 0, cw);
+    for (std::uint16_t cw : {cia402::kShutdown, cia402::kShutdown, cia402::kSwitchOn})
+      cycle(GroupCommand::SpindleMode::off, false, 0, cw);
   }
   double turn(int cycles, bool tripped = false, std::uint8_t flags = 0) {
     double speed = 0;
-    for (int i = 0; i < cycles; ++i) speed = cycle(GroupCommand::SpindleMode::clockwise, tripped, flags).second_encoder;
+    for (int i = 0; i < cycles; ++i)
+      speed = cycle(GroupCommand::SpindleMode::clockwise, tripped, flags).second_encoder;
     return speed;
   }
 
