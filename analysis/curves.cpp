@@ -6,7 +6,7 @@
 namespace vcnc {
 namespace {
 
-constexpr std::size_t kBuckets = 1200, kLissajousPoints = 1200, kPathPoints = 2000;
+constexpr std::size_t kBuckets = 1200, kLissajousPoints = 1200, kCurvePoints = 2000;
 
 /// ADC code to the signal before the amplifier, in units of the nominal amplitude: 1 Vpp is
 /// amplified 2.5 times about the middle of a 3.3 V converter.
@@ -35,8 +35,8 @@ class PathMeans {
     bin.sum += e_n;
     ++bin.count;
   }
-  std::vector<PathPoint> points() const {
-    std::vector<PathPoint> result;
+  std::vector<CurvePoint> points() const {
+    std::vector<CurvePoint> result;
     for (std::size_t i = 0; i < bins_.size(); ++i) {
       // Stations are not quite evenly spaced, bins are: look up the station's own bin.
       const Station& st = line_.stations()[i];
@@ -101,7 +101,7 @@ Curves collect_curves(const RecordingReader& recording, const Summary& summary) 
     *e = Envelope(0, std::max(summary.line_length, summary.last_station), kBuckets);
   const auto rows = static_cast<std::size_t>(summary.rows);
   const std::size_t lissajous_stride = rows / kLissajousPoints + 1,
-                    path_stride = rows / kPathPoints + 1;
+                    path_stride = rows / kCurvePoints + 1;
   const double duration = seconds(summary.rows + static_cast<std::int64_t>(summary.missing_rows));
   const int bits = evaluation.machine().probe.adc_bits;
   std::optional<PathMeans> means;
@@ -122,7 +122,8 @@ Curves collect_curves(const RecordingReader& recording, const Summary& summary) 
             {normalised(row.adc[2 * i], bits), normalised(row.adc[2 * i + 1], bits)});
     if (k % path_stride == 0) c.theoretical.push_back(now.error.theoretical);
     ++k;
-    if (!now.counts()) return;
+    const bool in_whole_lap = now.lap >= 1 && now.lap <= summary.whole_laps;
+    if (!now.counts() || (summary.whole_laps > 0 && !in_whole_lap)) return;
     c.path_feed = std::max(c.path_feed, row.feed);
     c.e_n.add(now.place.s, now.error.e_n);
     c.e_plan.add(now.place.s, now.error.e_plan);

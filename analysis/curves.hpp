@@ -32,7 +32,7 @@ class Envelope {
 };
 
 /// A station of the scan line with the mean error measured there.
-struct PathPoint {
+struct CurvePoint {
   Vec3 centre, n;
   double e_n = 0;
   bool measured = false;
@@ -48,7 +48,7 @@ struct Curves {
   PerAxis<Envelope> following;            ///< over time [s]
   Envelope bus_load, feed;                ///< over time [s]
   double path_feed = 0;                   ///< largest commanded feed on the path [m/s]
-  std::vector<PathPoint> path;            ///< the scan line; empty: none was followed
+  std::vector<CurvePoint> path;           ///< the scan line; empty: none was followed
   std::vector<Vec3> theoretical;          ///< commanded path, thinned, where there is no line
   std::vector<FacePart> faces;
   /// Raw signals of x, y, z as (cos, sin), 1 = nominal amplitude.

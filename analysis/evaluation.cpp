@@ -15,13 +15,6 @@ constexpr double kInterferenceStep = 1e-6;       ///< histogram of the interfere
 constexpr double kInterferenceMismatch = 20e-6;  ///< that is worth a warning [m]
 constexpr std::size_t kMostAlarms = 10000;       ///< memory stays bounded
 
-void add(ErrorGroup& group, const ErrorSample& e, double s) {
-  group.e_n.add(e.e_n, s);
-  group.e_plan.add(e.e_plan, s);
-  group.e_servo.add(e.e_servo, s);
-  group.e_rest.add(e.e_rest, s);
-}
-
 std::unique_ptr<Piece> piece_of(const RunBegin& begin) {
   if (begin.piece_toml.empty()) return nullptr;
   return make_piece(parse_piece(begin.piece_toml, "piece of the run"));
@@ -35,12 +28,9 @@ Evaluation::Evaluation(const RunBegin& begin)
       piece_(piece_of(begin)),
       dynamic_error_(machine_, piece_.get()),
       interference_(kInterferenceBins, 0) {
-  whole_.name = "whole path";
-  for (std::size_t i = 0; i < faces_.size(); ++i) faces_[i].name = kFaceNames[i];
   if (!piece_) return;
   tracker_.emplace(*piece_, machine_.probe.ball_radius);
   if (piece_->params().kind != PieceParams::Kind::ring) return;
-  for (auto& bins : circle_) bins.resize(kAngleBins);
   const Vec3 axis = piece_->params().direction.normalized();
   const Vec3 x = std::abs(axis.x()) < 0.9 ? Vec3::UnitX() : Vec3::UnitY();
   circle_x_ = (x - x.dot(axis) * axis).normalized();
@@ -61,23 +51,38 @@ EvaluatedRow Evaluation::row(const TelemetryRow& row) {
   if (state == NcState::running || state == NcState::dwell || state == NcState::hold)
     for (std::size_t j = 0; j < kAxisCount; ++j)
       following_[j].add(result.error.following[j], seconds(tick));
-  if (tracker_) {
-    result.place = tracker_->track(result.error);
-    if (tracker_->line() != nullptr && coverage_.size() == 0) start_line();
-    on_path(result);
-  }
+  if (!tracker_) return result;
+  result.place = tracker_->track(result.error);
+  if (tracker_->line() != nullptr && coverage_.size() == 0) start_line();
+  on_path(result);
+  result.lap = lap_number_;
   return result;
 }
 
 void Evaluation::start_line() {
   const ScanLine& line = *tracker_->line();
   coverage_ = Coverage(line.length(), machine_.setup.bin_length);
-  for (std::size_t i = 0; i < line.crossings().size(); ++i) {
-    ErrorGroup group;
-    group.name = fmt::format("crossing {}, {}", i + 1,
-                             kFaceNames[static_cast<std::size_t>(line.crossings()[i].face)]);
-    crossings_.push_back(std::move(group));
+  for (std::size_t i = 0; i < line.crossings().size(); ++i)
+    crossing_names_.push_back(fmt::format(
+        "crossing {}, {}", i + 1, kFaceNames[static_cast<std::size_t>(line.crossings()[i].face)]));
+}
+
+/// Closes the lap being run when its length has been travelled, and the run-in likewise.
+void Evaluation::count_laps(double step) {
+  if (!last_on_path_) {  // entering: what was begun before stays without its end
+    rest_.merge(lap_);
+    lap_ = {};
+    lap_number_ = 0;
+    lap_travel_ = 0;
   }
+  lap_travel_ += std::abs(step);
+  const double length = lap_number_ == 0 ? kRunIn : tracker_->line()->length();
+  if (lap_travel_ < length) return;
+  if (lap_number_ > 0) ++whole_laps_;
+  (lap_number_ > 0 ? laps_ : rest_).merge(lap_);
+  lap_ = {};
+  lap_travel_ -= length;
+  ++lap_number_;
 }
 
 void Evaluation::on_path(const EvaluatedRow& row) {
@@ -98,6 +103,7 @@ void Evaluation::on_path(const EvaluatedRow& row) {
   double step = 0;
   if (place.on_line) {
     step = station_step(*tracker_->line(), place.from, place.s);
+    if (tracker_->line()->closed()) count_laps(step);
     coverage_.add(place.from, step, last_on_path_ ? std::max(e.contact, last_contact_) : e.contact);
   } else {
     ++off_line_rows_;
@@ -108,21 +114,15 @@ void Evaluation::on_path(const EvaluatedRow& row) {
   watch_tolerance(row, step);
   if (!row.counts()) return;
 
-  add(whole_, e, place.s);
-  add(faces_[static_cast<std::size_t>(place.face)], e, place.s);
+  live_e_n_.add(e.e_n, place.s);
+  lap_.add(e, place.s, place.face);
   if (place.on_line) {
     const ScanLine& line = *tracker_->line();
-    for (std::size_t i = 0; i < crossings_.size(); ++i)
+    for (std::size_t i = 0; i < line.crossings().size(); ++i)
       if (std::abs(station_step(line, line.crossings()[i].s, place.s)) <= kCrossingReach)
-        add(crossings_[i], e, place.s);
+        lap_.add_crossing(i, e, place.s);
   }
-  for (std::size_t j = 0; j < kAxisCount; ++j) {
-    following_on_path_[j].add(e.following[j], place.s);
-    share_[j].add(e.share[j], place.s);
-  }
-  lag_.add(e.lag, place.s);
-  cross_.add(e.cross, place.s);
-  if (!circle_[0].empty()) collect_circle(row);
+  if (piece_->params().kind == PieceParams::Kind::ring) collect_circle(row);
 }
 
 void Evaluation::watch_tolerance(const EvaluatedRow& row, double step) {
@@ -133,10 +133,8 @@ void Evaluation::watch_tolerance(const EvaluatedRow& row, double step) {
   }
   if (over_samples_ > 0) over_arc_ += std::abs(step);
   ++over_samples_;
-  if (failed_ || over_samples_ < kFailSamples || over_arc_ < kFailArc) return;
-  failed_ = true;
-  fail_at_ = row.place.s;
-  fail_error_ = row.error.e_n;
+  if (over_samples_ < kFailSamples || over_arc_ < kFailArc) return;
+  if (!lap_.failure) lap_.failure = ToleranceFailure{row.place.s, row.error.e_n};
 }
 
 void Evaluation::collect_circle(const EvaluatedRow& row) {
@@ -145,11 +143,8 @@ void Evaluation::collect_circle(const EvaluatedRow& row) {
   const double turn = std::remainder(phi - last_phi_, 2 * kPi);
   last_phi_ = phi;
   if (turn == 0 || std::abs(turn) > 0.1) return;  // the first sample after an interruption
-  const double at = (phi < 0 ? phi + 2 * kPi : phi) / (2 * kPi) * kAngleBins;
-  AngleBin& bin = circle_[turn > 0 ? 0 : 1][std::min(static_cast<std::size_t>(at), kAngleBins - 1)];
   // Away from the material is inwards in a bore.
-  bin.sum += piece_->params().bore ? -row.error.e_n : row.error.e_n;
-  ++bin.count;
+  lap_.add_circle(phi, turn > 0, piece_->params().bore ? -row.error.e_n : row.error.e_n);
 }
 
 void Evaluation::alarm(const Alarm& alarm) {
@@ -167,6 +162,8 @@ double Evaluation::median_interference() const {
 }
 
 Summary Evaluation::finish(const RunEnd& end) const {
+  PathStatistics all = figures();
+  if (whole_laps_ == 0) all.merge(lap_);
   Summary s;
   s.run_id = begin_.run_id;
   s.program_name = begin_.program_name;
@@ -178,21 +175,30 @@ Summary Evaluation::finish(const RunEnd& end) const {
   s.missing_rows = missing_;
   s.alarms = alarms_;
   s.following = following_;
-  s.following_on_path = following_on_path_;
-  s.share = share_;
-  s.lag = lag_;
-  s.cross = cross_;
+  s.following_on_path = all.following;
+  s.share = all.share;
+  s.lag = all.lag;
+  s.cross = all.cross;
+  s.whole_laps = whole_laps_;
   s.tolerance = machine_.setup.tolerance;
   s.predeflection = machine_.setup.predeflection;
-  s.groups.push_back(whole_);
-  for (const ErrorGroup& face : faces_)
-    if (face.e_n.count > 0 && face.e_n.count < whole_.e_n.count) s.groups.push_back(face);
-  for (const ErrorGroup& crossing : crossings_) s.groups.push_back(crossing);
-  for (std::size_t d = 0; d < 2; ++d) {
+  const auto add_group = [&](ErrorGroup group, std::string_view name) {
+    group.name = name;
+    s.groups.push_back(std::move(group));
+  };
+  add_group(all.whole, "whole path");
+  for (std::size_t i = 0; i < all.faces.size(); ++i)
+    if (all.faces[i].e_n.count > 0 && all.faces[i].e_n.count < all.whole.e_n.count)
+      add_group(all.faces[i], kFaceNames[i]);
+  all.crossings.resize(crossing_names_.size());
+  for (std::size_t i = 0; i < crossing_names_.size(); ++i)
+    add_group(all.crossings[i], crossing_names_[i]);
+  for (std::size_t d = 0; d < all.circle.size(); ++d) {
     std::vector<CircularPoint> points;
-    for (std::size_t i = 0; i < circle_[d].size(); ++i)
-      if (const AngleBin& b = circle_[d][i]; b.count > 0)
-        points.push_back({(static_cast<double>(i) + 0.5) / kAngleBins * 2 * kPi, b.sum / b.count});
+    for (std::size_t i = 0; i < all.circle[d].size(); ++i)
+      if (const AngleBin& b = all.circle[d][i]; b.count > 0)
+        points.push_back({(static_cast<double>(i) + 0.5) / PathStatistics::kAngleBins * 2 * kPi,
+                          b.sum / b.count});
     const int direction = d == 0 ? 1 : -1;
     if (const auto result = evaluate_circle(points, direction))
       s.circles.push_back({direction, *result});
@@ -202,35 +208,36 @@ Summary Evaluation::finish(const RunEnd& end) const {
     s.line_length = line->length();
     s.line_z = line->z();
     s.line_closed = line->closed();
-    for (std::size_t i = 0; i < crossings_.size(); ++i)
-      s.crossings.push_back({line->crossings()[i].s, crossings_[i].name});
+    for (std::size_t i = 0; i < crossing_names_.size(); ++i)
+      s.crossings.push_back({line->crossings()[i].s, crossing_names_[i]});
     for (std::size_t i = 0; i < coverage_.size(); ++i) s.bins.push_back(coverage_.bin(i));
     s.bin_length = coverage_.bin_length();
     s.coverage_percent = coverage_.percent();
   }
   s.last_station = last_station_;
-  judge(s);
+  judge(s, all.failure);
   warn(s);
   return s;
 }
 
-void Evaluation::judge(Summary& s) const {
-  const double worst_um = whole_.e_n.max_abs() * 1e6, tolerance_um = s.tolerance * 1e6;
+void Evaluation::judge(Summary& s, const std::optional<ToleranceFailure>& failure) const {
+  const Statistics& e_n = s.groups.front().e_n;
+  const double worst_um = e_n.max_abs() * 1e6, tolerance_um = s.tolerance * 1e6;
   const bool complete = !s.bins.empty() && s.count(Coverage::Bin::ok) == std::ssize(s.bins);
-  if (failed_) {
+  if (failure) {
     s.verdict = Verdict::fail;
     s.verdict_reason = fmt::format(
         "e_n = {:+.1f} um at s = {:.1f} mm exceeds the tolerance of {:.1f} um on at least {} "
         "samples "
         "and {:.1f} mm of the path",
-        fail_error_ * 1e6, fail_at_ * 1e3, tolerance_um, kFailSamples, kFailArc * 1e3);
+        failure->e_n * 1e6, failure->s * 1e3, tolerance_um, kFailSamples, kFailArc * 1e3);
   } else if (!piece_) {
     s.verdict_reason = "the run has no workpiece";
-  } else if (whole_.e_n.count == 0) {
+  } else if (e_n.count == 0) {
     s.verdict_reason = "the probe never scanned the piece";
   } else if (!complete) {
     s.verdict_reason = fmt::format("only {:.1f} % of the path is measured", s.coverage_percent);
-  } else if (whole_.e_n.max_abs() > s.tolerance) {
+  } else if (e_n.max_abs() > s.tolerance) {
     s.verdict_reason =
         fmt::format("single samples of up to {:.1f} um exceed the tolerance of {:.1f} um", worst_um,
                     tolerance_um);

@@ -6,6 +6,11 @@
 // Verdict. FAIL: |e_n| exceeds the tolerance on consecutive samples, at least kFailSamples of them
 // over at least kFailArc of the path (known at once: the measurement may end early). PASS: the
 // whole path is covered and |e_n| never exceeds the tolerance. Else INCOMPLETE.
+//
+// Laps. On a closed scan line the figures are those of whole laps: the first kRunIn of travel and
+// what follows the last whole lap (run-out, leaving the piece) do not count, so that starting and
+// stopping are not taken for errors of the path. Where no lap is completed everything on the path
+// counts.
 #pragma once
 
 #include <array>
@@ -16,17 +21,20 @@
 #include "analysis/coverage.hpp"
 #include "analysis/dynamic_error.hpp"
 #include "analysis/lap_tracker.hpp"
+#include "analysis/path_statistics.hpp"
 #include "analysis/summary.hpp"
 
 namespace vcnc {
 
 inline constexpr int kFailSamples = 3;
 inline constexpr double kFailArc = 0.3e-3;  ///< [m]
+inline constexpr double kRunIn = 5e-3;      ///< [m]
 
 /// One row with its place on the scan path.
 struct EvaluatedRow {
   ErrorSample error;
   LapTracker::Place place;
+  int lap = 0;  ///< on a closed line: 0 during the run-in, then 1, 2, ...
   /// On the path, and the probe's value can be believed: counts in the statistics.
   bool counts() const { return place.on_path && error.contact == Contact::ok; }
 };
@@ -40,8 +48,10 @@ class Evaluation {
   void alarm(const Alarm& alarm);
   Summary finish(const RunEnd& end) const;
 
-  bool failed() const { return failed_; }
-  const Statistics& e_n() const { return whole_.e_n; }
+  /// The tolerance is exceeded, as far as one can say by now.
+  bool failed() const { return lap_.failure || figures().failure; }
+  /// e_n of everything on the path so far, run-in and run-out included.
+  const Statistics& e_n() const { return live_e_n_; }
   const Coverage& coverage() const { return coverage_; }
   const ScanLine* line() const { return tracker_ ? tracker_->line() : nullptr; }
   const Machine& machine() const { return machine_; }
@@ -50,10 +60,13 @@ class Evaluation {
  private:
   void on_path(const EvaluatedRow& row);
   void start_line();
+  void count_laps(double step);
+  /// What counts: whole laps, else everything.
+  const PathStatistics& figures() const { return whole_laps_ > 0 ? laps_ : rest_; }
   void watch_tolerance(const EvaluatedRow& row, double step);
   void collect_circle(const EvaluatedRow& row);
   double median_interference() const;
-  void judge(Summary& summary) const;
+  void judge(Summary& summary, const std::optional<ToleranceFailure>& failure) const;
   void warn(Summary& summary) const;
 
   RunBegin begin_;
@@ -71,26 +84,22 @@ class Evaluation {
   Contact last_contact_ = Contact::ok;
   bool last_on_path_ = false;
 
-  ErrorGroup whole_;
-  std::array<ErrorGroup, 5> faces_;
-  std::vector<ErrorGroup> crossings_;
-  PerAxis<Statistics> following_, following_on_path_, share_;
-  Statistics lag_, cross_;
+  PathStatistics laps_;  ///< of whole laps
+  PathStatistics lap_;   ///< of the lap being run
+  PathStatistics rest_;  ///< of what belongs to no whole lap
+  int whole_laps_ = 0;
+  int lap_number_ = 0;
+  double lap_travel_ = 0;  ///< since the run-in or the lap began [m]
+  Statistics live_e_n_;
+  std::vector<std::string> crossing_names_;
+  PerAxis<Statistics> following_;  ///< every row while the program runs
 
   static constexpr std::size_t kInterferenceBins = 4096;  ///< of 1 um, for the median
   std::vector<std::uint32_t> interference_;
 
-  bool failed_ = false;
-  double fail_at_ = 0, fail_error_ = 0;
   int over_samples_ = 0;
   double over_arc_ = 0;
 
-  struct AngleBin {
-    double sum = 0;
-    std::uint32_t count = 0;
-  };
-  static constexpr std::size_t kAngleBins = 7200;  ///< of 0.05 deg
-  std::array<std::vector<AngleBin>, 2> circle_;    ///< counter-clockwise, clockwise
   Vec3 circle_x_ = Vec3::UnitX(), circle_y_ = Vec3::UnitY();
   double last_phi_ = 0;
 

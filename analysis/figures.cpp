@@ -123,12 +123,12 @@ std::string path_figure(const Curves& curves, const Summary& s, double& magnific
   }
   // The magnified tolerance must stay clear of the rest of the path.
   double extent = 0, worst = s.tolerance;
-  for (const PathPoint& p : curves.path) {
+  for (const CurvePoint& p : curves.path) {
     extent = std::max(extent, (p.centre - curves.path.front().centre).norm());
     worst = std::max(worst, std::abs(p.e_n));
   }
   magnification = round_down(0.02 * extent / worst);
-  const auto offset = [&](const PathPoint& p, double e) {
+  const auto offset = [&](const CurvePoint& p, double e) {
     const Vec3 q = p.centre + magnification * e * p.n;
     return fmt::format("{:.6g} {:.6g}\n", q.x() * 1e3, q.y() * 1e3);
   };
@@ -136,7 +136,7 @@ std::string path_figure(const Curves& curves, const Summary& s, double& magnific
               band = "$band << EOD\n";
   std::string inner;
   bool any_over = false;
-  for (const PathPoint& p : curves.path) {
+  for (const CurvePoint& p : curves.path) {
     nominal += offset(p, 0);
     band += offset(p, s.tolerance);
     inner += offset(p, -s.tolerance);

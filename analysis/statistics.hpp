@@ -20,6 +20,14 @@ struct Statistics {
     sum += value;
     sum_of_squares += value * value;
   }
+  void merge(const Statistics& later) {
+    if (later.count == 0) return;
+    if (count == 0 || later.max > max) max = later.max, at_max = later.at_max;
+    if (count == 0 || later.min < min) min = later.min, at_min = later.at_min;
+    count += later.count;
+    sum += later.sum;
+    sum_of_squares += later.sum_of_squares;
+  }
   double mean() const { return count ? sum / static_cast<double>(count) : 0; }
   double rms() const { return count ? std::sqrt(sum_of_squares / static_cast<double>(count)) : 0; }
   double peak_to_peak() const { return max - min; }

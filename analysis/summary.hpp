@@ -50,6 +50,7 @@ struct Summary {
   Statistics lag, cross;                  ///< tracking error on the path [m]
 
   // The dynamic error on the scan path; groups[0] is the whole path
+  int whole_laps = 0;  ///< that the figures are taken from; 0: from everything on the path
   std::vector<ErrorGroup> groups;
   std::vector<CircularSummary> circles;
   double tolerance = 0, predeflection = 0;  ///< [m]

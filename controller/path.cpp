@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace vcnc {
 namespace {
@@ -218,17 +219,20 @@ double Path::largest_width(double s, double from, double cap) const {
   const double lowest =
       std::min({cap, length_, 3 * tolerance, 3 * kRotaryLength * angle_tolerance_});
   const double highest = std::min(cap, length_);
-  double good = lowest, bad = highest;
-  if (within_tolerance(s, highest, tolerance)) return highest;
-  if (from > good && from < bad) {
-    if (within_tolerance(s, from, tolerance)) {
-      good = from;
-      if (!within_tolerance(s, std::min(from * 1.2, bad), tolerance))
-        bad = std::min(from * 1.2, bad);
-    } else {
-      bad = from;
-      if (from / 1.2 > good && within_tolerance(s, from / 1.2, tolerance)) good = from / 1.2;
+  // Neighbours are alike, and narrow hats are cheap to try: grow or shrink from there.
+  double good = lowest, bad = std::numeric_limits<double>::infinity();
+  const double start = std::clamp(from, lowest, highest);
+  if (within_tolerance(s, start, tolerance)) {
+    good = start;
+    for (double factor = 1.2; good < highest && bad > highest; factor *= factor) {
+      const double wider = std::min(factor * good, highest);
+      (within_tolerance(s, wider, tolerance) ? good : bad) = wider;
     }
+    if (good >= highest) return highest;
+  } else {
+    bad = start;
+    const double narrower = start / 1.2;
+    if (narrower > lowest) (within_tolerance(s, narrower, tolerance) ? good : bad) = narrower;
   }
   while (bad > 1.05 * good) {
     const double middle = std::sqrt(good * bad);

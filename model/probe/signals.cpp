@@ -83,7 +83,7 @@ ChannelSample SignalChannel::sample(double true_deflection) {
     digital = corrector_.correct(digital);
     if (corrector_.ellipse()) amplitude = corrector_.ellipse()->amplitude;
   }
-  const double share = std::hypot(digital.u, digital.w) / amplitude;
+  const double share = std::sqrt(digital.u * digital.u + digital.w * digital.w) / amplitude;
   result.fault = share < kLeastShare || share > kMostShare || adc_.clipped(result.cos_code) ||
                  adc_.clipped(result.sin_code);
   check_slip_ = check_slip_ || share < kLeastShare || share > kMostShare;

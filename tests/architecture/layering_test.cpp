@@ -140,6 +140,21 @@ TEST(Layering, HeavyHeadersStayInOneSourceFile) {
   for (const auto& [header, most] : limit) EXPECT_LE(users[header].size(), most) << header;
 }
 
+/// Two types of one name in one program are undefined behaviour that no compiler reports.
+TEST(Layering, EveryTypeInAHeaderHasANameOfItsOwn) {
+  static const std::regex type(R"((?:^|\n)(?:struct|class|enum class) (\w+)[^;\n]*\{)");
+  std::map<std::string, std::string> owner;
+  for (const Source& source : sources()) {
+    if (!source.path.ends_with(".hpp")) continue;
+    for (std::sregex_iterator i(source.text.begin(), source.text.end(), type), end; i != end; ++i) {
+      const auto [known, fresh] = owner.emplace((*i)[1], source.path);
+      EXPECT_TRUE(fresh || known->second == source.path)
+          << (*i)[1] << " is in " << known->second << " and in " << source.path;
+    }
+  }
+  EXPECT_GT(owner.size(), 80u);
+}
+
 TEST(Layering, MainsAreShort) {
   for (const Source& source : sources()) {
     if (!source.path.ends_with("_main.cpp")) continue;
