@@ -121,13 +121,16 @@ std::string path_figure(const Curves& curves, const Summary& s, double& magnific
       text += fmt::format("{:.6g} {:.6g}\n", p.x() * 1e3, p.y() * 1e3);
     return text + "EOD\nplot " + line("line", "theoretical path of the ball centre", kInk) + "\n";
   }
-  // The magnified tolerance must stay clear of the rest of the path.
-  double extent = 0, worst = s.tolerance;
+  // What is magnified must stay clear of the rest of the path; a tolerance that does not is left
+  // out.
+  constexpr double kClear = 0.02;  // of the extent
+  double extent = 0, worst = 0.05 * s.tolerance;
   for (const CurvePoint& p : curves.path) {
     extent = std::max(extent, (p.centre - curves.path.front().centre).norm());
     worst = std::max(worst, std::abs(p.e_n));
   }
-  magnification = round_down(0.02 * extent / worst);
+  magnification = round_down(kClear * extent / worst);
+  const bool show_band = magnification * s.tolerance <= 1.5 * kClear * extent;
   const auto offset = [&](const CurvePoint& p, double e) {
     const Vec3 q = p.centre + magnification * e * p.n;
     return fmt::format("{:.6g} {:.6g}\n", q.x() * 1e3, q.y() * 1e3);
@@ -147,10 +150,13 @@ std::string path_figure(const Curves& curves, const Summary& s, double& magnific
   }
   text += nominal + "EOD\n" + band + "\n" + inner + "EOD\n" + actual + "EOD\n" + over +
           "NaN NaN\nEOD\n";
+  text += "plot ";
+  if (show_band)
+    text +=
+        line("band", fmt::format("tolerance ±{:g} µm", s.tolerance * 1e6).c_str(), "#b4bcc8", 1.0) +
+        ", ";
   text +=
-      "plot " +
-      line("band", fmt::format("tolerance ±{:g} µm", s.tolerance * 1e6).c_str(), "#b4bcc8", 1.0) +
-      ", " + line("nominal", "theoretical path", kGrey, 1.0) + ", " +
+      line("nominal", "theoretical path", kGrey, 1.0) + ", " +
       line("actual", fmt::format("actual path, error × {:g}", magnification).c_str(), kInk, 1.8);
   if (any_over) text += ", " + line("over", "out of tolerance", kRed, 2.2);
   return text + "\n";

@@ -285,7 +285,7 @@ void write_report(const RecordingReader& recording, const Summary& s,
         figure(script,
                fmt::format(
                    "Theoretical and actual path of the ball centre in workpiece coordinates; the "
-                   "error and its tolerance are magnified {:g} times.",
+                   "error is magnified {:g} times.",
                    magnification));
     html += "<h2>Error along the path</h2>\n" +
             figure(error_figure(curves, s),

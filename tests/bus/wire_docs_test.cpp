@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <map>
 #include <set>
 #include <sstream>
@@ -72,6 +73,13 @@ TEST(WireDocs, DbcHasEveryFrameOnceAndMarksFd) {
   for (const char* attribute : {"BusType", "VFrameFormat", "CANFD_BRS"})
     EXPECT_NE(text.find("BA_DEF_DEF_ \"" + std::string(attribute) + "\""), std::string::npos);
   EXPECT_NE(text.find("SG_ x_position : 32|48@1- (1e-10,0) "), std::string::npos);
+}
+
+/// The page in docs/ is the generated one. `vcnc wire` prints it.
+TEST(WireDocs, PageInDocsIsCurrent) {
+  std::ifstream in(std::string(VCNC_SOURCE_DIR) + "/docs/wire.md");
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  EXPECT_EQ(text, wire_table_markdown());
 }
 
 }  // namespace
