@@ -39,6 +39,11 @@ Evaluation::Evaluation(const RunBegin& begin)
 
 EvaluatedRow Evaluation::row(const TelemetryRow& row) {
   EvaluatedRow result;
+  const auto countable = [](double v) { return v >= 0 && v < 0x1p53; };  // not NaN either
+  if (!countable(row.tick) || !countable(row.state) || row.state > 100) {
+    ++damaged_;  // of a damaged file
+    return result;
+  }
   result.error = dynamic_error_.evaluate(row);
   const Tick tick = result.error.tick;
   if (rows_ > 0) {
@@ -256,6 +261,7 @@ void Evaluation::warn(Summary& s) const {
         "is {:.3f}: e_n and e_plan contain the difference",
         *s.interference * 1e3, s.predeflection * 1e3));
   if (missing_ > 0) s.warnings.push_back(fmt::format("{} rows are missing", missing_));
+  if (damaged_ > 0) s.warnings.push_back(fmt::format("{} rows are damaged and left out", damaged_));
   if (disordered_ > 0)
     s.warnings.push_back(fmt::format("{} rows arrived twice or out of order", disordered_));
   if (s.end.gaps > 0)

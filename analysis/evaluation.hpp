@@ -78,7 +78,7 @@ class Evaluation {
 
   std::int64_t rows_ = 0;
   Tick last_tick_ = 0;
-  std::uint64_t missing_ = 0, disordered_ = 0;
+  std::uint64_t missing_ = 0, disordered_ = 0, damaged_ = 0;
   std::int64_t on_path_rows_ = 0, off_line_rows_ = 0;
   double last_station_ = 0;
   Contact last_contact_ = Contact::ok;

@@ -49,7 +49,7 @@ void LapTracker::enter(const ErrorSample& sample) {
   if (!entered_) {
     distance_ref_ = sample.distance;
     try {
-      line_.emplace(piece_, ball_radius_, interference(), sample.theoretical.z());
+      line_.emplace(piece_, ball_radius_, interference(), piece_.scan_height(sample.theoretical));
       kept_.resize(line_->stations().size());
     } catch (const std::invalid_argument&) {
       // The piece has no scan path at this height: the program follows some other path.

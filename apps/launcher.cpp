@@ -52,13 +52,21 @@ void Launcher::start(const std::string& name, std::vector<std::string> argv) {
   for (std::string& a : argv) arguments.push_back(a.data());
   arguments.push_back(nullptr);
 
+  // The child must not meet a signal with this program's handlers.
+  sigset_t all, before;
+  ::sigfillset(&all);
+  ::sigprocmask(SIG_BLOCK, &all, &before);
   const pid_t parent = ::getpid();
   child.pid = ::fork();
+  if (child.pid != 0) ::sigprocmask(SIG_SETMASK, &before, nullptr);
   if (child.pid < 0) throw LaunchError(system_error(name + ": fork"));
   if (child.pid == 0) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) ::_exit(127);
     ::setpgid(0, 0);  // Ctrl-C goes to the launcher, which ends the run in order
+    ::signal(SIGINT, SIG_DFL);
+    ::signal(SIGTERM, SIG_DFL);
+    ::sigprocmask(SIG_SETMASK, &before, nullptr);
     ::fcntl(pipe_ends[1], F_SETFD, 0);
     ::dup2(child.words, STDERR_FILENO);
     ::execv(arguments[0], arguments.data());
@@ -137,6 +145,12 @@ void Launcher::signal(const std::string& name, int signal_number) {
 bool Launcher::running(const std::string& name) const {
   return std::any_of(children_.begin(), children_.end(),
                      [&](const Child& c) { return c.name == name; });
+}
+
+std::string Launcher::names() const {
+  std::string all;
+  for (const Child& child : children_) all += (all.empty() ? "" : ", ") + child.name;
+  return all;
 }
 
 void Launcher::kill_all() {

@@ -53,6 +53,7 @@ class Launcher {
   void signal(const std::string& name, int signal_number);
   bool running(const std::string& name) const;
   std::size_t running() const { return children_.size(); }
+  std::string names() const;  ///< of all that run
   void kill_all();
 
  private:

@@ -31,5 +31,7 @@ int guarded_main(const char* name, int (*body)(int, char**), int argc, char** ar
 /// Exit codes of every program.
 inline constexpr int kExitOk = 0, kExitFailure = 1, kExitBadInput = 2, kExitAlarm = 3,
                      kExitInterrupted = 130;
+/// Of a module only: it ended because the bus did, so the cause is elsewhere.
+inline constexpr int kExitBusGone = 4;
 
 }  // namespace vcnc

@@ -32,14 +32,26 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kReadyTimeoutMs = 20000;
-constexpr int kStopTimeoutMs = 5000;       ///< modules, after the NC unit has ended
-constexpr int kResultsTimeoutMs = 300000;  ///< analysis, to write its results
+constexpr int kStopTimeoutMs = 5000;           ///< modules, after the NC unit has ended
+constexpr int kResultsTimeoutMs = 300000;      ///< analysis, to write its results
+constexpr int kHastyResultsTimeoutMs = 20000;  ///< the same after Ctrl-C
 
-int run_in_process(const RunOptions& options, const Machine& machine, const RunFolder& folder) {
-  std::unique_ptr<PieceParams> piece;
-  if (!machine.setup.piece.empty())
-    piece = std::make_unique<PieceParams>(load_piece(machine.setup.piece));
-  VirtualMachine modules(machine, piece.get(), options.seed);
+/// The piece of the machine, null where it has none. A piece file whose numbers make no surface is
+/// the user's to mend.
+std::unique_ptr<PieceParams> piece_of(const Machine& machine) {
+  if (machine.setup.piece.empty()) return nullptr;
+  auto piece = std::make_unique<PieceParams>(load_piece(machine.setup.piece));
+  try {
+    make_piece(*piece);
+  } catch (const std::invalid_argument& e) {
+    throw InputError(machine.setup.piece + ": " + e.what());
+  }
+  return piece;
+}
+
+int run_in_process(const RunOptions& options, const Machine& machine, const PieceParams* piece,
+                   const RunFolder& folder) {
+  VirtualMachine modules(machine, piece, options.seed);
   InprocTransport transport(modules.nodes());
   AnalysisSession session({.folder = folder.path(), .report = options.report, .csv = options.csv});
   ProgressLine progress;
@@ -56,28 +68,30 @@ int run_in_process(const RunOptions& options, const Machine& machine, const RunF
   return result.exit_code();
 }
 
-/// A piece file whose numbers make no surface is the user's to mend.
-void check_piece(const std::string& path) {
-  try {
-    make_piece(load_piece(path));
-  } catch (const std::invalid_argument& e) {
-    throw InputError(path + ": " + e.what());
-  }
-}
-
 std::string text_of(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// A bus that cannot be opened is told before anything is started.
+void check_bus(const std::string& uri) {
+  try {
+    open_transport(uri, kTapId);
+  } catch (const BusError& e) {
+    throw InputError(std::string("--bus: ") + e.what());
+  }
 }
 
 /// A private directory for sockets, gone with the run.
 class SocketFolder {
  public:
   SocketFolder() {
-    std::string pattern = (fs::temp_directory_path() / "vcnc-XXXXXX").string();
-    if (!::mkdtemp(pattern.data()))
-      throw LaunchError("no temporary directory can be made in " +
-                        fs::temp_directory_path().string());
+    std::error_code error;
+    const fs::path base = fs::temp_directory_path(error);
+    std::string pattern = (base / "vcnc-XXXXXX").string();
+    if (error || !::mkdtemp(pattern.data()))
+      throw InputError(
+          "TMPDIR: no folder can be made in it; it must name a folder one can write to");
     path_ = pattern;
   }
   ~SocketFolder() {
@@ -111,41 +125,73 @@ void start_modules(Launcher& launcher, const RunOptions& options, const RunFolde
 
 struct RunEnded {
   int nc_code = kExitFailure;
-  std::string failure;  ///< the first one; what follows from it is not told
+  std::string failure;  ///< the cause; what follows from it is not told
 };
 
 /// Shows the progress until every process has ended; sees to it that they do.
-RunEnded watch(Launcher& launcher) {
-  constexpr int kStepMs = 100;
-  ProgressLine progress;
-  RunEnded ended;
-  bool told_to_stop = false, ending = false;
-  int patience_ms = 0;
-  while (launcher.running() > 0) {
-    if (stop_requested() && !told_to_stop) {
-      told_to_stop = true;
-      progress.show("stopping ...");
-      launcher.signal("NC unit", SIGTERM);
+class Watch {
+ public:
+  Watch(Launcher& launcher, const RunFolder& folder) : launcher_(launcher), folder_(folder) {}
+
+  RunEnded until_all_ended() {
+    constexpr int kStepMs = 100;
+    while (launcher_.running() > 0) {
+      if (stop_requested() && !told_to_stop_) stop("stopping ...");
+      const auto exited =
+          launcher_.next(kStepMs, [&](const std::string& text) { progress_.show(text); });
+      if (exited) {
+        note(*exited);
+      } else if (ending_ && (patience_ms_ -= kStepMs) <= 0) {
+        if (stop_requested())
+          nc_code_ = kExitInterrupted;
+        else if (failure_.empty())
+          failure_ = "did not end and were killed: " + launcher_.names();
+        launcher_.kill_all();
+      }
     }
-    const auto exited =
-        launcher.next(kStepMs, [&](const std::string& text) { progress.show(text); });
-    if (exited) {
-      const bool nc = exited->name == "NC unit";
-      if (nc) ended.nc_code = exited->code;
-      const bool expected = exited->code == kExitOk || (nc && exited->last_words.empty());
-      if (!expected && ended.failure.empty()) ended.failure = exited->sentence();
-      const bool analysis_died = exited->name == "analysis" && launcher.running("NC unit");
-      if (analysis_died) launcher.signal("NC unit", SIGTERM);
-      ending = ending || nc || analysis_died;
-      patience_ms = launcher.running("analysis") ? kResultsTimeoutMs : kStopTimeoutMs;
-    } else if (ending && (patience_ms -= kStepMs) <= 0) {
-      if (ended.failure.empty())
-        ended.failure = "modules still ran after the end of the run and were killed";
-      launcher.kill_all();
-    }
+    return {nc_code_.value_or(kExitFailure), !failure_.empty() ? failure_ : consequence_};
   }
-  return ended;
-}
+
+ private:
+  void stop(const char* what) {
+    told_to_stop_ = ending_ = true;
+    patience_ms_ = kStopTimeoutMs;
+    progress_.show(what);
+    launcher_.signal("NC unit", SIGTERM);
+  }
+
+  void note(const Exited& exited) {
+    const bool nc = exited.name == "NC unit";
+    if (nc) nc_code_ = exited.code;
+    const bool dismissed = exited.name == "analysis" && dismissed_;
+    const bool expected = exited.code == kExitOk || dismissed ||
+                          (nc && (exited.code == kExitAlarm || exited.code == kExitInterrupted));
+    if (exited.code == kExitBusGone)
+      consequence_ = exited.sentence();
+    else if (!expected && failure_.empty())
+      failure_ = exited.sentence();
+
+    if (exited.name == "analysis" && !expected && launcher_.running("NC unit"))
+      stop("the analysis has died, stopping ...");
+    if (!nc) return;
+    ending_ = true;
+    const bool results_to_write = launcher_.running("analysis") && folder_.has_recording();
+    patience_ms_ = !results_to_write  ? kStopTimeoutMs
+                   : stop_requested() ? kHastyResultsTimeoutMs
+                                      : kResultsTimeoutMs;
+    if (results_to_write) return;
+    dismissed_ = true;  // the run never began
+    launcher_.signal("analysis", SIGTERM);
+  }
+
+  Launcher& launcher_;
+  const RunFolder& folder_;
+  ProgressLine progress_;
+  std::optional<int> nc_code_;
+  std::string failure_, consequence_;
+  bool told_to_stop_ = false, ending_ = false, dismissed_ = false;
+  int patience_ms_ = 0;
+};
 
 int run_processes(const RunOptions& options, const RunFolder& folder) {
   SocketFolder sockets;
@@ -160,12 +206,13 @@ int run_processes(const RunOptions& options, const RunFolder& folder) {
 
   Launcher launcher;
   start_modules(launcher, options, folder, bus, sockets.file("truth"));
+  if (stop_requested()) return kExitInterrupted;
   launcher.start("NC unit",
                  {program_directory() + "/vcnc-nc", "--machine", folder.machine_file(), "--program",
                   fs::absolute(options.program).string(), "--bus", bus, "--pace",
                   fmt::format("{}", options.pace), "--seed", std::to_string(options.seed)});
 
-  const RunEnded ended = watch(launcher);
+  const RunEnded ended = Watch(launcher, folder).until_all_ended();
   std::cout << text_of(folder.path() / "summary.txt");
   if (ended.failure.empty()) return ended.nc_code;
   std::cerr << "vcnc: " << ended.failure << '\n';
@@ -176,16 +223,18 @@ int run_processes(const RunOptions& options, const RunFolder& folder) {
 
 int run_command(const RunOptions& options) {
   const Machine machine = load_machine(options.machine, options.assignments);
-  if (!machine.setup.piece.empty()) check_piece(machine.setup.piece);
+  const std::unique_ptr<PieceParams> piece = piece_of(machine);
   Player(options.program,
          machine);  // refuses a wrong program before anything is started or written
   const bool in_process = options.in_process || options.bus == "inproc://";
+  if (!in_process && options.bus != "hub://") check_bus(options.bus);
   catch_stop_signals();
-  RunFolder folder(options.out);
-  folder.write_inputs(machine);
+  RunFolder folder(options.out, {options.program, options.machine, machine.setup.piece});
   try {
-    const int code =
-        in_process ? run_in_process(options, machine, folder) : run_processes(options, folder);
+    folder.write_inputs(machine, piece.get());
+    const int code = in_process ? run_in_process(options, machine, piece.get(), folder)
+                                : run_processes(options, folder);
+    folder.remove_if_without_results();
     if (fs::exists(folder.path() / "report.html"))
       std::cout << "report: " << (folder.path() / "report.html").string() << '\n';
     return code;

@@ -13,7 +13,7 @@ int serve(Node& node, const NodeOptions& options) {
   ControlPipe(options.control_fd).ready();
   if (run_node(node, *transport) == NodeExit::stopped) return kExitOk;
   std::cerr << "the bus is gone";
-  return kExitFailure;
+  return kExitBusGone;
 }
 
 }  // namespace vcnc

@@ -1,5 +1,6 @@
 // vcnc: the command that people type.
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <iostream>
 #include <memory>
 
@@ -28,9 +29,17 @@ double parse_pace(const std::string& text) {
   return pace;
 }
 
+std::uint64_t parse_seed(const std::string& text) {
+  std::uint64_t seed = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (error != std::errc() || end != text.data() + text.size())
+    throw InputError("--seed " + text + ": expected a whole number, 0 .. 18446744073709551615");
+  return seed;
+}
+
 void add_run(CLI::App& app, int& code) {
   struct Arguments : RunOptions {
-    std::string pace_text = "free";
+    std::string pace_text = "free", seed_text = "1";
     bool no_report = false;
   };
   const auto o = std::make_shared<Arguments>();
@@ -39,17 +48,18 @@ void add_run(CLI::App& app, int& code) {
   run->add_option("PROGRAM", o->program, "G-code program")->required();
   run->add_option("--machine", o->machine, "machine file (TOML)")->required();
   run->add_option("--set", o->assignments,
-                  "override a key of the machine file, e.g. axes.Y.kv_per_s=38")
+                  "override a key of the machine file, e.g. axes.Y.velocity_ff=0.9")
       ->allow_extra_args(false);
   run->add_option("--bus", o->bus, "hub:// (default), can://INTERFACE or inproc://");
   run->add_option("--pace", o->pace_text, "free (default) or a factor of real time");
-  run->add_option("--seed", o->seed, "seed of all noise");
+  run->add_option("--seed", o->seed_text, "seed of all noise (default 1)");
   run->add_option("--out", o->out, "folder for the results")->required();
   run->add_flag("--in-process", o->in_process, "all modules in this process");
   run->add_flag("--csv", o->csv, "also write every row as rows.csv");
   run->add_flag("--no-report", o->no_report, "no report.html");
   run->callback([o, &code] {
     o->pace = parse_pace(o->pace_text);
+    o->seed = parse_seed(o->seed_text);
     o->report = !o->no_report;
     code = run_command(*o);
   });
@@ -67,6 +77,8 @@ void add_analyze(CLI::App& app) {
                               "also write summary.json and report.html into this folder");
   analyze_command->add_flag("--csv", o->csv, "with --out: also write every row as rows.csv");
   analyze_command->callback([o] {
+    if (o->csv && o->out.empty())
+      throw InputError("--csv: needs --out FOLDER to write rows.csv into");
     const RecordingReader recording(o->path);
     for (const std::string& missing : recording.missing())
       std::cerr << "vcnc: " << o->path << ": missing: " << missing << '\n';

@@ -240,7 +240,7 @@ std::optional<OvertravelState> decode_overtravel_state(const Frame& frame) {
   if (!fits(frame, kOvertravelId, kOvertravelLength)) return std::nullopt;
   OvertravelState m;
   wire::take_all<kOvertravelState>(frame, m);
-  if (m.state > OvertravelState::State::tripped || m.cause > OvertravelState::Cause::silent)
+  if (m.state > OvertravelState::State::tripped || m.cause > OvertravelState::Cause::slip)
     return std::nullopt;
   return m;
 }

@@ -113,7 +113,14 @@ struct ProbeSample {
 
 struct OvertravelState {
   enum class State : std::uint8_t { normal = 0, warn = 1, tripped = 2 };
-  enum class Cause : std::uint8_t { none = 0, range = 1, overtravel = 2, signal = 3, silent = 4 };
+  enum class Cause : std::uint8_t {
+    none = 0,
+    range = 1,
+    overtravel = 2,
+    signal = 3,
+    silent = 4,
+    slip = 5
+  };
   std::uint16_t tick = 0;
   State state = State::normal;
   Cause cause = Cause::none;

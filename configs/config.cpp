@@ -185,7 +185,24 @@ class Reader {
   std::set<std::string> known_;
 };
 
+constexpr std::uintmax_t kLargestFile = 4'000'000;
+constexpr std::ptrdiff_t kDeepest = 64;
+
+/// The parser recurses with the depth of dotted keys and brackets; no file of ours is that deep.
+void refuse_deep_lines(std::string_view text, const std::string& name) {
+  int line = 1;
+  for (std::size_t at = 0; at < text.size(); ++line) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    const std::string_view one = text.substr(at, end - at);
+    const std::string_view key = one.substr(0, one.find('='));
+    if (std::count(key.begin(), key.end(), '.') > kDeepest)
+      throw ConfigError(fmt::format("{}:{}: a key of more than {} parts", name, line, kDeepest));
+    at = end + 1;
+  }
+}
+
 toml::table parse(std::string_view text, const std::string& name) {
+  refuse_deep_lines(text, name);
   try {
     return toml::parse(text, name);
   } catch (const toml::parse_error& e) {
@@ -194,7 +211,13 @@ toml::table parse(std::string_view text, const std::string& name) {
 }
 
 std::string read_file(const std::string& path) {
-  if (fs::is_directory(path)) throw ConfigError(path + ": is a directory, expected a TOML file");
+  std::error_code error;
+  if (fs::is_directory(path, error))
+    throw ConfigError(path + ": is a directory, expected a TOML file");
+  if (fs::exists(path, error) && !fs::is_regular_file(path, error))
+    throw ConfigError(path + ": is not a regular file, expected a TOML file");
+  if (fs::exists(path, error) && fs::file_size(path, error) > kLargestFile)
+    throw ConfigError(path + ": is larger than 4 MB, too large for a TOML file of ours");
   std::ifstream in(path, std::ios::binary);
   if (!in) throw ConfigError(path + ": cannot be opened");
   std::ostringstream text;
@@ -227,6 +250,7 @@ toml::table parse_assignment(const std::string& assignment) {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0)
     throw ConfigError(name + ": expected key=value, for example axes.Y.kv_per_s=38");
+  refuse_deep_lines(assignment, name);
   try {
     return toml::parse(assignment, name);
   } catch (const toml::parse_error&) {  // a bare word is a text
@@ -246,6 +270,17 @@ void check_whole(const Machine& m, const std::string& name) {
     if (l.start < l.min || l.start > l.max)
       throw ConfigError(fmt::format("{}: axes.{}: the start position is outside the travel limits",
                                     name, kAxisNames[i]));
+  }
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const AxisEffects& e = m.effects.axis[i];
+    const MechanicsParams& mass = m.axes[i].mechanics;
+    if ((e.backlash.gap > 0 || e.windup.compliance > 0) &&
+        mass.reflected_inertia() <= 1e-3 * mass.load)
+      throw ConfigError(
+          fmt::format("{}: axes.{}.motor_inertia_kgm2: with backlash or windup the motor, seen "
+                      "from the load, needs at "
+                      "least a thousandth of the load's inertia",
+                      name, kAxisNames[i]));
   }
   if (m.probe.adc_bits != 12 && m.probe.adc_bits != 16)
     throw ConfigError(fmt::format("{}: probe.adc_bits: {} is not possible, allowed 12 or 16", name,

@@ -11,7 +11,7 @@ namespace {
 class Reference {
  public:
   void operator()(std::string_view key, const double& v, Unit u, Range r, const char* doc) {
-    row(key, limits(r), toml_number(v, u), doc);
+    row(key, limits(r), fmt::format("{:.10g}", v / u.to_si), doc);
   }
   void operator()(std::string_view key, const Vec3& v, Unit u, Range r, const char* doc) {
     row(key, "3 x " + limits(r),

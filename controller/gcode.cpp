@@ -31,7 +31,7 @@ Block GcodeInterpreter::next() {
   while (ready_.empty()) {
     if (ended_) return ProgramEnd{lines_.number()};
     if (!lines_.next(text)) {
-      if (lines_.number() == 0) throw ProgramError(lines_.where() + ": the program is empty");
+      if (lines_.number() == 0) throw ProgramError(lines_.path() + ": the program is empty");
       fail("the program does not end with M2 or M30");
     }
     read_line(text);

@@ -92,6 +92,9 @@ ProgramLines::ProgramLines(const std::string& path) : path_(path) {
   if (!std::filesystem::exists(status)) throw ProgramError(path + ": no such program file");
   if (std::filesystem::is_directory(status))
     throw ProgramError(path + ": is a directory, not a program file");
+  // The program is read twice, once to check it, so it cannot come out of a pipe.
+  if (!std::filesystem::is_regular_file(status))
+    throw ProgramError(path + ": is not a regular file");
   file_.open(path, std::ios::binary);
   if (!file_) throw ProgramError(path + ": the program file cannot be read");
 }

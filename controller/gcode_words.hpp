@@ -36,6 +36,7 @@ class ProgramLines {
   bool next(std::string& line);
 
   int number() const { return number_; }  ///< of the line last read, from 1
+  const std::string& path() const { return path_; }
   std::string where() const { return path_ + ":" + std::to_string(number_); }
 
  private:

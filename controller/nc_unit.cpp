@@ -39,10 +39,44 @@ const char* cause_text(OvertravelState::Cause cause) {
       return "the probe's signals are faulty";
     case OvertravelState::Cause::silent:
       return "the probe has fallen silent";
+    case OvertravelState::Cause::slip:
+      return "the probe moved too fast to be counted, its reading is lost";
     case OvertravelState::Cause::none:
       break;
   }
   return "no cause given";
+}
+
+std::string module_name(int node) {
+  if (node >= 1 && node <= static_cast<int>(kAxisCount))
+    return fmt::format("drive {}", kAxisNames[static_cast<std::size_t>(node - 1)]);
+  switch (node) {
+    case kSpindleNode:
+      return "drive spindle";
+    case kProbeNode:
+      return "probe";
+    case kOvertravelNode:
+      return "overtravel";
+    default:
+      return fmt::format("node {}", node);
+  }
+}
+
+const char* emergency_text(std::uint16_t code) {
+  switch (code) {
+    case 0x8100:
+      return "communication disturbed";
+    case 0x8110:
+      return "frames lost";
+    case 0x8130:
+      return "the overtravel module has fallen silent";
+    case 0x8250:
+      return "no command from the NC unit";
+    case 0xff10:
+      return "the overtravel protection has tripped";
+    default:
+      return "a fault of the module";
+  }
 }
 
 }  // namespace
@@ -81,13 +115,15 @@ void NcUnit::latch(Tick k, std::span<const Frame> answers) {
     } else if (const auto overtravel = decode_overtravel_state(frame)) {
       overtravel_ = *overtravel;
     } else if (const auto emergency = decode_emergency(frame); emergency && emergency->code != 0) {
-      sink_.alarm({k, static_cast<int>(Code::node), fmt::format("node {}", emergency->node),
-                   fmt::format("emergency message {:04X}h", emergency->code)});
+      sink_.alarm({k, static_cast<int>(Code::node), module_name(emergency->node),
+                   fmt::format("{} (emergency message {:04X}h)", emergency_text(emergency->code),
+                               emergency->code)});
     }
   }
 }
 
 void NcUnit::raise(Tick k, Code code, std::string source, std::string text) {
+  if (planned_.step.line > 0) text += fmt::format(" (program line {})", planned_.step.line);
   if (!alarmed_) reason_ = fmt::format("alarm {}: {}", static_cast<int>(code), text);
   alarmed_ = true;
   state_ = NcState::alarm;
@@ -108,6 +144,12 @@ void NcUnit::supervise(Tick k) {
           fmt::format(
               "probe deflection ({:.3f}, {:.3f}, {:.3f}) mm is out of range; spindle locked",
               probe_.deflection[0] * 1e3, probe_.deflection[1] * 1e3, probe_.deflection[2] * 1e3));
+    return;
+  }
+  if (machine_.probe.in_spindle &&
+      (probe_.flags & (ProbeSample::kSlip | ProbeSample::kSignalFault))) {
+    raise(k, Code::probe_signal, "NC unit",
+          "the probe's reading cannot be trusted any more; spindle locked");
     return;
   }
   if (state_ == NcState::starting) {

@@ -14,9 +14,37 @@
 namespace vcnc {
 namespace {
 
-constexpr std::size_t kLongestRun = 50'000;  ///< moves; a longer run stops once in between
+// A longer run stops once in between, so that planning it takes bounded memory.
+constexpr std::size_t kMostMoves = 50'000;
+constexpr double kLongestWay = 200;       ///< [m] of the controlled point
+constexpr double kLongestSeconds = 3600;  ///< at the programmed feed
 constexpr double kExactCorner = 1.0 * kDegree;
 constexpr double kOrientSeconds = 0.2;  ///< from a standing spindle into its M19 position
+
+/// About how far the controlled point goes in a move [m].
+double way_of(const Move& move) {
+  if (move.kind == Move::Kind::arc) {
+    Vec3 radius = move.start.head<3>() - move.arc.centre;
+    radius[static_cast<Eigen::Index>(move.arc.normal)] = 0;
+    return radius.norm() * std::abs(move.arc.sweep);
+  }
+  return (move.end - move.start).head<3>().norm();
+}
+
+/// How long a move takes at its feed; rapids count nothing.
+double seconds_of(const Move& move) {
+  switch (move.feed_mode) {
+    case Move::Feed::none:
+      return 0;
+    case Move::Feed::tip:
+      return way_of(move) / move.feed;
+    case Move::Feed::rotary:
+      return (move.end - move.start).tail<2>().norm() / move.feed;
+    case Move::Feed::time:
+      return move.feed;
+  }
+  return 0;
+}
 
 /// Throws where a position leaves the travel of an axis.
 void check_travel(const Coordinates& q, const Machine& machine, const std::string& where) {
@@ -92,12 +120,15 @@ struct Player::State {
   /// Collects the moves that follow without a stop, and plans them.
   void begin_run(Move first) {
     std::vector<Move> moves{std::move(first)};
-    while (moves.size() < kLongestRun) {
+    double way = way_of(moves.back()), time = seconds_of(moves.back());
+    while (moves.size() < kMostMoves && way < kLongestWay && time < kLongestSeconds) {
       pending = program.next();
       Move* next = std::get_if<Move>(&*pending);
       if (!next || !continues(moves.back(), *next)) break;
       moves.push_back(std::move(*next));
       pending.reset();
+      way += way_of(moves.back());
+      time += seconds_of(moves.back());
     }
     Path path(std::move(moves), machine.nc.angle_tolerance);
     if (path.segments().empty()) return;

@@ -76,7 +76,8 @@ struct ServoParams {
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit) {
-    visit("kv_per_s", p.kv_per_s, unit::per_s, Range{0.1, 1000}, "position loop gain");
+    visit("kv_per_s", p.kv_per_s, unit::per_s, Range{0.1, 1000},
+          "position loop gain; with full feed-forward an ideal drive does not show it");
     visit("velocity_bandwidth_Hz", p.velocity_bandwidth, unit::hz, Range{1, 1000},
           "velocity loop crossover frequency");
     visit("integral_time_ms", p.integral_time, unit::ms, Range{0.5, 10000},
@@ -253,7 +254,7 @@ struct SetupParams {
     visit("predeflection_mm", p.predeflection, unit::mm, Range{0.01, 5},
           "how deep the program drives the ball into the piece");
     visit("tolerance_um", p.tolerance, unit::um, Range{0.1, 10000},
-          "verdict: |e_n| must stay within");
+          "verdict: e_n must stay within plus and minus this");
     visit("bin_length_mm", p.bin_length, unit::mm, Range{0.05, 100},
           "arc-length bins of the coverage");
   }

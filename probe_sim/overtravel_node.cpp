@@ -21,6 +21,7 @@ bool OvertravelNode::accepts(std::uint16_t cob_id) const {
 OvertravelState::Cause OvertravelNode::judge(const ProbeSample& sample) const {
   if (sample.flags & ProbeSample::kOvertravel) return OvertravelState::Cause::overtravel;
   if (sample.flags & ProbeSample::kSignalFault) return OvertravelState::Cause::signal;
+  if (sample.flags & ProbeSample::kSlip) return OvertravelState::Cause::slip;
   return range_.contains(vec(sample.deflection)) ? OvertravelState::Cause::none
                                                  : OvertravelState::Cause::range;
 }

@@ -1,8 +1,10 @@
 // The overtravel protection: a module of its own that sees only the bus.
 //
 //   NORMAL -> WARN     any component of the deflection beyond 80 % of its usable range
-//   any    -> TRIPPED  beyond the usable range, the probe's overtravel signal, a faulty signal, or
-//                      a probe that falls silent for more than two cycles
+//   any    -> TRIPPED  beyond the usable range, the probe's overtravel signal, a faulty signal,
+//   lost
+//                      periods (the ball moved too fast to be counted: its reading means nothing
+//                      any more), or a probe that falls silent for more than two cycles
 // TRIPPED is latched: only the operator's reset opens it, and only once the cause is gone. It is
 // told in every cycle (OvertravelState) and once as EMCY FF10h; drives stop and the spindle locks
 // on it by themselves. The usable range depends on mounting and stylus mass:

@@ -13,7 +13,8 @@ AxisVector start_position(const Machine& machine) {
   return q;
 }
 
-/// The probe's own protection unit: travel or force beyond its limits in any direction.
+/// The probe's own protection unit, a mechanical switch: it feels the true travel and force,
+/// whatever the scales count.
 bool overtravelled(const ProbeParams& probe, const Vec3& deflection) {
   const double lateral = deflection.head<2>().norm(), axial = std::abs(deflection.z());
   return lateral >= std::min(probe.overtravel_lateral,
@@ -46,11 +47,12 @@ ToolPose ProbeNode::pose(const std::array<TruthCycle, kTruthAxes>& truth,
 
 void ProbeNode::sample(const ToolPose& pose) {
   const Vec3 deflection = contact_.step(pose);
+  overtravelled_ = overtravelled(probe_, deflection);
   for (std::size_t c = 0; c < channels_.size(); ++c)
     last_[c] = channels_[c].sample(deflection[static_cast<Eigen::Index>(c)]);
 }
 
-ProbeSample ProbeNode::reading(Tick k, bool truth_lost) const {
+ProbeSample ProbeNode::reading(Tick k) const {
   ProbeSample reading{.tick = low16(k)};
   for (std::size_t c = 0; c < last_.size(); ++c) {
     reading.deflection[c] = last_[c].deflection;
@@ -62,22 +64,20 @@ ProbeSample ProbeNode::reading(Tick k, bool truth_lost) const {
   const Vec3 deflection(reading.deflection.data());
   if (deflection.norm() >= probe_.min_deflection) reading.flags |= ProbeSample::kContact;
   if (!range_.contains(deflection)) reading.flags |= ProbeSample::kOutOfRange;
-  if (overtravelled(probe_, deflection)) reading.flags |= ProbeSample::kOvertravel;
-  if (truth_lost) reading.flags |= ProbeSample::kSignalFault;
+  if (overtravelled_) reading.flags |= ProbeSample::kOvertravel;
   return reading;
 }
 
 void ProbeNode::step(Tick k, std::span<const Frame>, Frames& out) {
-  std::array<TruthCycle, kTruthAxes> truth;
-  bool truth_lost = false;
   if (k == 0) {
     sample(kinematics_.forward(start_));
-  } else if (truth_.collect(k - 1, truth)) {
-    for (std::size_t j = 0; j < kLoopStepsPerCycle; ++j) sample(pose(truth, j));
   } else {
-    truth_lost = true;
+    std::array<TruthCycle, kTruthAxes> truth;
+    if (!truth_.collect(k - 1, truth))  // a failure of the host, not of the machine
+      throw TruthError("the true motion of cycle " + std::to_string(k - 1) + " did not arrive");
+    for (std::size_t j = 0; j < kLoopStepsPerCycle; ++j) sample(pose(truth, j));
   }
-  out.push_back(encode(reading(k, truth_lost)));
+  out.push_back(encode(reading(k)));
 }
 
 }  // namespace vcnc

@@ -29,12 +29,13 @@ class ProbeNode : public Node {
   int id() const override { return kProbeNode; }
   std::string_view name() const override { return "probe"; }
   bool accepts(std::uint16_t) const override { return false; }
+  /// Throws TruthError when the simulators' own channel failed.
   void step(Tick k, std::span<const Frame> inputs, Frames& out) override;
 
  private:
   ToolPose pose(const std::array<TruthCycle, kTruthAxes>& truth, std::size_t sample) const;
   void sample(const ToolPose& pose);
-  ProbeSample reading(Tick k, bool truth_lost) const;
+  ProbeSample reading(Tick k) const;
 
   ProbeParams probe_;
   UsableRange range_;
@@ -43,6 +44,7 @@ class ProbeNode : public Node {
   ProbeContact contact_;
   std::array<SignalChannel, 3> channels_;
   std::array<ChannelSample, 3> last_;
+  bool overtravelled_ = false;
   TruthPort& truth_;
   AxisVector start_;
 };

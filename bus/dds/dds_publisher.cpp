@@ -20,6 +20,7 @@ constexpr std::size_t kWakeRows = 20;                     ///< rows that are wor
 constexpr std::size_t kMostRows = 100;                    ///< rows in one message
 constexpr auto kPatience = std::chrono::milliseconds(2);  ///< with fewer rows than that
 constexpr int kSliceMs = 20;
+constexpr int kStallMs = 60'000;  ///< a subscriber that takes nothing for so long is stuck
 
 using dds::check;
 
@@ -313,7 +314,8 @@ bool DdsPublisher::State::anyone_behind(std::uint64_t seq) {
 
 void DdsPublisher::State::await_window(std::uint64_t seq) {
   read_progress();
-  while (anyone_behind(seq) && !is_stopping()) {
+  for (int waited_ms = 0; anyone_behind(seq) && !is_stopping(); waited_ms += kSliceMs) {
+    if (waited_ms >= kStallMs) throw DdsError("a subscriber has stopped taking rows");
     check(dds_waitset_wait(waitset.get(), nullptr, 0, DDS_MSECS(kSliceMs)), "waiting");
     read_progress();
   }

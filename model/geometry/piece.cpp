@@ -103,6 +103,9 @@ class Ring final : public Piece {
     if (!(radius > 0)) fail("ball_radius: the ball does not fit into the ring");
     return circle(at, axis_, radius, step, Vec3(side, 0, 0), Vec3::UnitZ());
   }
+  double scan_height(const Vec3& p) const override {
+    return params_.centre.z() + axis_.dot(p - params_.centre) * axis_.z();
+  }
   const PieceParams& params() const override { return params_; }
 
  private:
@@ -244,6 +247,9 @@ class Cone final : public Piece {
     if (foot < 0 || foot > params_.height) fail("z: beyond the flank of the cone");
     const double radius = params_.radius + (reach - h * sin_) / cos_;
     return circle(at, axis_, radius, step, Vec3(cos_, 0, sin_), Vec3(-sin_, 0, cos_));
+  }
+  double scan_height(const Vec3& p) const override {
+    return params_.centre.z() + axis_.dot(p - params_.centre) * axis_.z();
   }
   const PieceParams& params() const override { return params_; }
 

@@ -60,6 +60,8 @@ class Piece {
   /// with the first. Throws std::invalid_argument when there is no such path.
   virtual std::vector<Station> scan_path(double ball_radius, double interference, double z,
                                          double step) const = 0;
+  /// The height z for which scan_path() runs through a ball centre at p.
+  virtual double scan_height(const Vec3& p) const { return p.z(); }
   virtual const PieceParams& params() const = 0;
 };
 

@@ -294,7 +294,7 @@ TEST(Messages, MeaninglessCodesAreRefused) {
   overtravel.data[2] = 3;
   EXPECT_FALSE(decode_overtravel_state(overtravel));
   overtravel.data[2] = 0;
-  overtravel.data[3] = 5;
+  overtravel.data[3] = 6;
   EXPECT_FALSE(decode_overtravel_state(overtravel));
 }
 

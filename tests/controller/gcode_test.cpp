@@ -349,7 +349,7 @@ const WrongProgram kWrong[] = {
     {"G43.4 H1\nG53 G0 X1\nM30", 2, "G53 while G43.4 is active"},
     {"G43.4 H1\nG28 X1\nM30", 2, "G28 while G43.4 is active"},
     // the whole program
-    {"", 0, "the program is empty"},
+    {"\n", 1, "does not end with M2 or M30"},
     {"G0 X1\n", 1, "does not end with M2 or M30"},
     {"G0 X1\nG1 Y1 F100\n\n", 3, "does not end with M2 or M30"},
     {"%\nO1\nG0 X1\n;\nX2000\nM30", 5,
@@ -382,6 +382,16 @@ TEST(RefusedPrograms, RandomTextIsRefusedOrReadButNeverWorse) {
   }
   EXPECT_GT(read, 100);
   EXPECT_LT(read, 2900);
+}
+
+TEST(RefusedPrograms, AnEmptyFileIsNamedWithoutALine) {
+  const ProgramFile file("");
+  try {
+    Player player(file.path(), test_machine());
+    FAIL();
+  } catch (const ProgramError& error) {
+    EXPECT_EQ(std::string(error.what()), file.path() + ": the program is empty");
+  }
 }
 
 TEST(RefusedPrograms, AreMany) { EXPECT_GE(std::size(kWrong), 60u); }

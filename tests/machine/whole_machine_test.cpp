@@ -45,6 +45,16 @@ TEST_P(IdealMachine, MeasuresNothingButWhatThePlannerPlanned) {
 INSTANTIATE_TEST_SUITE_P(BothKinematics, IdealMachine,
                          testing::Values("machines/trunnion.toml", "machines/head.toml"));
 
+TEST(WholeMachine, TheIdealMachineScansTheTiltedConeCompletely) {
+  const Machine machine = load_machine(configs("machines/trunnion.toml"),
+                                       {"setup.piece=" + configs("pieces/cone.toml")});
+  const auto piece = make_piece(*piece_params(machine));
+  const Outcome run = play(machine, cone_program(machine, *piece, {}));
+  EXPECT_EQ(run.summary.verdict, Verdict::pass) << run.summary.verdict_reason;
+  EXPECT_EQ(run.summary.coverage_percent, 100);
+  EXPECT_LE(run.summary.groups.at(0).e_rest.peak_to_peak(), 1 * um);
+}
+
 /// The steady full circle of a circular test: dR(phi) seen by the probe, one value per cycle.
 struct Circle {
   std::vector<double> phi, dr;
@@ -216,6 +226,24 @@ TEST(Overtravel, TheTripReachesTheDrivesWithinTwoCycles) {
   ASSERT_GT(out_of_range, 0);
   // The sample is told in cycle k, judged in k+1, acted upon in k+2.
   EXPECT_LE(braking - out_of_range, 4);
+}
+
+TEST(Overtravel, ARapidCrashTripsToo) {
+  // At rapid the ball moves faster than its periods can be counted: the reading is worthless, but
+  // the machine must stop all the same. Sideways into the plane, and from above onto one.
+  const Outcome lateral = crash(30000);
+  EXPECT_EQ(lateral.nc.exit_code(), 3) << lateral.nc.end.reason;
+  EXPECT_GT(lateral.rows.back().q_act[kX], 0.09 + 1e-3) << "it must not reach the programmed end";
+
+  PieceParams floor;
+  floor.kind = PieceParams::Kind::plane;
+  floor.centre = {0, 0, 0.08};
+  const TemporaryFile piece("floor.toml", to_toml(floor));
+  const Machine machine =
+      load_machine(configs("machines/trunnion.toml"), {"setup.piece=" + piece.path()});
+  const Outcome axial = play(machine, "G90 G21 G54\nM19\nG43 H1\nG0 X0 Y0 Z120\nG0 Z70\nM30\n");
+  EXPECT_EQ(axial.nc.exit_code(), 3) << axial.nc.end.reason;
+  EXPECT_GT(axial.rows.back().q_act[kZ], 0.07 + 0.05 + 0.15 + 1e-3);
 }
 
 TEST(Overtravel, TheNcUnitsOwnCheckStopsItWhenTheModuleIsBlind) {

@@ -144,5 +144,20 @@ TEST(Piece, RefusesImpossiblePieces) {
                std::invalid_argument);
 }
 
+TEST(ScanHeight, GivesTheScanPathThroughABallCentre) {
+  for (const auto kind :
+       {PieceParams::Kind::ring, PieceParams::Kind::sphere, PieceParams::Kind::cone}) {
+    PieceParams params;
+    params.kind = kind;
+    params.direction = Vec3(0.17, 0.05, 0.98).normalized();
+    params.height = 0.06;
+    params.radius = 0.08;
+    const auto piece = make_piece(params);
+    const double z = 0.02;
+    for (const Station& s : piece->scan_path(3e-3, 0.5e-3, z, 5e-3))
+      EXPECT_NEAR(piece->scan_height(s.centre), z, 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace vcnc

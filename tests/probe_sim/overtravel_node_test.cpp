@@ -55,6 +55,8 @@ TEST_F(OvertravelNodeTest, TripsOnTheProbesSignalsAndOnSilence) {
   hear(0, 0, true);
   EXPECT_EQ(hear(0.1, ProbeSample::kSignalFault).cause, Cause::signal);
   hear(0, 0, true);
+  EXPECT_EQ(hear(0.1, ProbeSample::kSlip).cause, Cause::slip);
+  hear(0, 0, true);
   EXPECT_EQ(step({}).state, State::normal);
   EXPECT_EQ(step({}).state, State::normal);
   EXPECT_EQ(step({}).cause, Cause::silent);

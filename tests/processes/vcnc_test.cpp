@@ -161,6 +161,60 @@ TEST_F(RunningMachine, AKilledAnalysisLeavesARecordingThatOpens) {
   EXPECT_NE(said.err.find("missing"), std::string::npos);
 }
 
+TEST_F(RunningMachine, AKilledNcUnitIsNamedAndNotItsVictims) {
+  start();
+  shell(scratch_, "pkill -9 -f 'vcnc-nc.*" + (scratch_ / "run") + "'");
+  EXPECT_EQ(wait(), 1);
+  const std::string err = read_text(scratch_ / "err");
+  EXPECT_NE(err.find("NC unit: killed by signal 9"), std::string::npos) << err;
+  EXPECT_EQ(leftovers(), "");
+}
+
+TEST_F(RunningMachine, ASecondRunIntoTheSameFolderIsRefused) {
+  start();
+  const Said said = run("run", "");
+  EXPECT_EQ(said.code, 2);
+  EXPECT_NE(said.err.find("another run is writing here"), std::string::npos) << said.err;
+  ::kill(child_, SIGINT);
+  EXPECT_EQ(wait(), 130);
+}
+
+TEST_F(RunningMachine, CtrlCEndsARunWhoseAnalysisIsStuck) {
+  start();
+  shell(scratch_, "pkill -STOP -f 'vcnc-analysis.*" + (scratch_ / "run") + "'");
+  ::kill(child_, SIGINT);
+  EXPECT_EQ(wait(), 130);
+  EXPECT_EQ(leftovers(), "");
+}
+
+TEST_F(Vcnc, AnEarlyCtrlCEndsAtOnce) {
+  for (const char* delay : {"0.02", "0.1", "0.3"}) {
+    const Said said =
+        shell(scratch_, "timeout -s INT " + std::string(delay) + " " + bin("vcnc") + " run " +
+                            (scratch_ / "short.ngc") + " --machine " + kMachine +
+                            " --pace 1 --no-report --out " + (scratch_ / "early"));
+    EXPECT_NE(said.code, 0);
+    EXPECT_EQ(leftovers(), "") << delay;
+  }
+}
+
+TEST_F(Vcnc, InputsInTheFolderOfResultsAreNeverLost) {
+  ASSERT_EQ(run("a", "--in-process").code, 0);
+  const std::string machine = read_text(scratch_ / "a/machine.toml");
+  const Said said = shell(scratch_, bin("vcnc") + " run " + (scratch_ / "short.ngc") +
+                                        " --machine " + (scratch_ / "a/machine.toml") +
+                                        " --in-process --out " + (scratch_ / "a"));
+  EXPECT_EQ(said.code, 2);
+  EXPECT_NE(said.err.find("is an input of this run"), std::string::npos) << said.err;
+  EXPECT_EQ(read_text(scratch_ / "a/machine.toml"), machine);
+  EXPECT_TRUE(fs::exists(scratch_ / "a/recording.h5"));
+
+  fs::create_directory(scratch_ / "mine");
+  write_text(scratch_ / "mine/machine.toml", "name = \"my own\"\n");
+  EXPECT_EQ(run("mine", "--in-process").code, 2);
+  EXPECT_EQ(read_text(scratch_ / "mine/machine.toml"), "name = \"my own\"\n");
+}
+
 TEST_F(RunningMachine, CtrlCEndsInOrder) {
   start();
   ::kill(child_, SIGINT);
@@ -231,8 +285,15 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"NoPiece", "{GOOD} --set setup.piece={S}none.toml", 2,
                  "none.toml: cannot be opened"},
         BadInput{"BadSurface", "{GOOD} --set setup.piece={S}surface.toml", 2, "surface.toml: "},
-        BadInput{"NoBus", "{GOOD} --bus can://nosuchcan0", 1, "nosuchcan0"},
-        BadInput{"UnknownBus", "{GOOD} --bus smoke://signals", 1, "smoke"},
+        BadInput{"NoBus", "{GOOD} --bus can://nosuchcan0", 2, "nosuchcan0"},
+        BadInput{"UnknownBus", "{GOOD} --bus smoke://signals", 2, "smoke"},
+        BadInput{"Seed", "{GOOD} --seed -1", 2, "expected a whole number"},
+        BadInput{"DeepKey",
+                 "{GOOD} --set "
+                 "a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a."
+                 "a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a=1",
+                 2, "a key of more than"},
+        BadInput{"NotAFile", "/dev/stdin --machine {M} --out {S}out", 2, "is not a regular file"},
         BadInput{"Pace", "{GOOD} --pace fast", 2, "expected free or a factor of real time"},
         BadInput{"ForeignFolder", "{S}short.ngc --machine {M} --out {S}mine", 2,
                  "holds other files"}),
