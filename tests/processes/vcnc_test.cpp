@@ -140,7 +140,7 @@ class RunningMachine : public Vcnc {
 
 TEST_F(RunningMachine, AKilledDriveEndsTheRunByName) {
   start();
-  shell(scratch_, "pkill -9 -f 'vcnc-drive.*" + (scratch_ / "run") + ".*--axis Y'");
+  shell(scratch_, "pkill -9 -f 'vcnc-driv[e].*" + (scratch_ / "run") + ".*--axis Y'");
   EXPECT_EQ(wait(), 1);
   const std::string err = read_text(scratch_ / "err");
   EXPECT_NE(err.find("drive Y: killed by signal 9"), std::string::npos) << err;
@@ -152,7 +152,7 @@ TEST_F(RunningMachine, AKilledDriveEndsTheRunByName) {
 
 TEST_F(RunningMachine, AKilledAnalysisLeavesARecordingThatOpens) {
   start();
-  shell(scratch_, "pkill -9 -f 'vcnc-analysis.*" + (scratch_ / "run") + "'");
+  shell(scratch_, "pkill -9 -f 'vcnc-analysi[s].*" + (scratch_ / "run") + "'");
   EXPECT_EQ(wait(), 1);
   EXPECT_NE(read_text(scratch_ / "err").find("analysis: killed by signal 9"), std::string::npos);
   EXPECT_EQ(leftovers(), "");
@@ -163,7 +163,7 @@ TEST_F(RunningMachine, AKilledAnalysisLeavesARecordingThatOpens) {
 
 TEST_F(RunningMachine, AKilledNcUnitIsNamedAndNotItsVictims) {
   start();
-  shell(scratch_, "pkill -9 -f 'vcnc-nc.*" + (scratch_ / "run") + "'");
+  shell(scratch_, "pkill -9 -f 'vcnc-n[c].*" + (scratch_ / "run") + "'");
   EXPECT_EQ(wait(), 1);
   const std::string err = read_text(scratch_ / "err");
   EXPECT_NE(err.find("NC unit: killed by signal 9"), std::string::npos) << err;
@@ -181,7 +181,7 @@ TEST_F(RunningMachine, ASecondRunIntoTheSameFolderIsRefused) {
 
 TEST_F(RunningMachine, CtrlCEndsARunWhoseAnalysisIsStuck) {
   start();
-  shell(scratch_, "pkill -STOP -f 'vcnc-analysis.*" + (scratch_ / "run") + "'");
+  shell(scratch_, "pkill -STOP -f 'vcnc-analysi[s].*" + (scratch_ / "run") + "'");
   ::kill(child_, SIGINT);
   EXPECT_EQ(wait(), 130);
   EXPECT_EQ(leftovers(), "");

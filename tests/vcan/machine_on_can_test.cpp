@@ -13,8 +13,8 @@ TEST(MachineOnCan, SameHashAsInOneProcess) {
   Scratch scratch;
   write_text(
       scratch / "short.ngc",
-      "G90 G21 G54\nG64 P0.01\nM19\nG0 A7.88 C173.92\nG43.4 H1\nG0 X115.4 Y38.43 Z30\nG0 Z20\n"
-      "G1 X110.8 Y35.44 F3000\nG1 X109 Y38 A8 C175\nG1 X115.4 Y38.43\nM30\n");
+      "G90 G21 G54\nG64 P0.01\nM19\nG0 A7.88 C173.92\nG43.4 H1\nG0 X115.4 Y38.43 Z79\nG0 Z20\n"
+      "G1 X110.8 Y35.44 F1000\nG1 X109 Y38 A8 C175 F2000\nG1 X115.4 Y38.43\nM30\n");
   const std::string run = bin("vcnc") + " run " + (scratch / "short.ngc") + " --machine " +
                           configs("machines/trunnion_measured.toml") + " --no-report";
   const Said alone = shell(scratch, run + " --in-process --out " + (scratch / "alone"));
