@@ -5,53 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/figure_style.hpp"
+
 namespace vcnc {
 namespace {
 
-constexpr const char* kInk = "#0b3c6f";
-constexpr const char* kGrey = "#8a8f98";
-constexpr const char* kOrange = "#d9730d";
-constexpr const char* kGreen = "#1a8a6b";
-constexpr const char* kRed = "#c0392b";
-constexpr const char* kViolet = "#7a4fa3";
-constexpr double kLeft = 0.09, kRight = 0.975;  ///< plot edges, shared so that x axes line up
-
-std::string heading(int width, int height) {
-  return fmt::format(
-      "set terminal svg size {},{} dynamic enhanced font 'Helvetica,13' background '#ffffff'\n"
-      "set encoding utf8\n"
-      "set border 3 lw 1 lc rgb '#5a6068'\n"
-      "set tics nomirror out scale 0.6 textcolor rgb '#333333'\n"
-      "set grid back lw 0.6 lc rgb '#e4e7eb'\n"
-      "set key top right horizontal Left reverse samplen 2 width 1 textcolor rgb '#333333' "
-      "opaque\n",
-      width, height);
-}
-
-std::string margins(double bottom, double top) {
-  return fmt::format(
-      "set lmargin at screen {}\nset rmargin at screen {}\n"
-      "set bmargin at screen {}\nset tmargin at screen {}\n",
-      kLeft, kRight, bottom, top);
-}
-
-/// A named data block of an envelope.
-std::string block(const char* name, const Envelope& e, double x_scale, double y_scale) {
-  std::string text = fmt::format("${} << EOD\n", name);
-  bool any = false;
-  for (const Envelope::Point& p : e.points()) {
-    if (p.starts && any) text += "\n";
-    text += fmt::format("{:.7g} {:.7g}\n", p.x * x_scale, p.y * y_scale);
-    any = true;
-  }
-  if (!any) text += "NaN NaN\n";
-  return text + "EOD\n";
-}
-
-std::string line(const char* name, const char* title, const char* colour, double width = 1.2) {
-  return fmt::format("${} using 1:2 with lines lw {} lc rgb '{}' title '{}'", name, width, colour,
-                     title);
-}
+using namespace figure_style;
 
 /// Largest magnitude in an envelope.
 double reach(const Envelope& e) {

@@ -12,7 +12,7 @@ namespace {
 int drive(int argc, char** argv) {
   using namespace vcnc;
   const NodeOptions options =
-      parse_node_options(argc, argv, "A servo or spindle drive on the bus", "mbta");
+      parse_node_options(argc, argv, "A servo or spindle drive on the bus", "mbtas");
   const Machine machine = load_machine(options.machine);
   if (options.axis == "spindle") {
     SpindleNode node(machine);
@@ -21,7 +21,7 @@ int drive(int argc, char** argv) {
   const auto axis =
       std::find(kAxisNames.begin(), kAxisNames.end(), options.axis) - kAxisNames.begin();
   const auto truth = open_truth_writer(options.truth);
-  DriveNode node(static_cast<std::size_t>(axis), machine, *truth);
+  DriveNode node(static_cast<std::size_t>(axis), machine, options.seed, *truth);
   return serve(node, options);
 }
 

@@ -20,7 +20,7 @@ int NcRunResult::exit_code() const {
 
 NcRunResult run_nc(const Machine& machine, const NcRunOptions& options, Transport& transport,
                    TelemetrySink& sink) {
-  NcUnit nc(machine, options.program, sink);
+  NcUnit nc(as_nc_believes(machine), options.program, sink);
   sink.begin({.run_id = std::to_string(::getpid()),
               .program_name = std::filesystem::path(options.program).filename().string(),
               .declared_toml = to_toml(declared(machine)),

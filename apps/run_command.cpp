@@ -111,8 +111,9 @@ void start_modules(Launcher& launcher, const RunOptions& options, const RunFolde
   const std::string machine = folder.machine_file();
   const std::string seed = std::to_string(options.seed);
   for (const char* axis : {"X", "Y", "Z", "A", "C", "spindle"})
-    launcher.start(fmt::format("drive {}", axis), {bin + "/vcnc-drive", "--machine", machine,
-                                                   "--bus", bus, "--truth", truth, "--axis", axis});
+    launcher.start(fmt::format("drive {}", axis),
+                   {bin + "/vcnc-drive", "--machine", machine, "--bus", bus, "--truth", truth,
+                    "--axis", axis, "--seed", seed});
   launcher.start("probe", {bin + "/vcnc-probe", "--machine", machine, "--bus", bus, "--truth",
                            truth, "--seed", seed});
   launcher.start("overtravel", {bin + "/vcnc-overtravel", "--machine", machine, "--bus", bus});
@@ -222,10 +223,10 @@ int run_processes(const RunOptions& options, const RunFolder& folder) {
 }  // namespace
 
 int run_command(const RunOptions& options) {
-  const Machine machine = load_machine(options.machine, options.assignments);
+  const Machine machine = load_machine(options.machine, options.assignments, options.injections);
   const std::unique_ptr<PieceParams> piece = piece_of(machine);
   Player(options.program,
-         machine);  // refuses a wrong program before anything is started or written
+         as_nc_believes(machine));  // refuses a wrong program before anything is started or written
   const bool in_process = options.in_process || options.bus == "inproc://";
   if (!in_process && options.bus != "hub://") check_bus(options.bus);
   catch_stop_signals();

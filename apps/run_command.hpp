@@ -12,6 +12,7 @@ struct RunOptions {
   std::string program;
   std::string machine;
   std::vector<std::string> assignments;  ///< --set key=value
+  std::vector<std::string> injections;   ///< --inject key=value
   std::string bus = "hub://";            ///< hub:// picks a path of its own
   double pace = 0;                       ///< times real time, 0 = free-running
   std::uint64_t seed = 1;

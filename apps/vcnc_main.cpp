@@ -5,6 +5,9 @@
 #include <memory>
 
 #include "analysis/session.hpp"
+#include "apps/compare_command.hpp"
+#include "apps/effects_command.hpp"
+#include "apps/gallery_command.hpp"
 #include "apps/node_options.hpp"
 #include "apps/program_command.hpp"
 #include "apps/run_command.hpp"
@@ -50,6 +53,10 @@ void add_run(CLI::App& app, int& code) {
   run->add_option("--set", o->assignments,
                   "override a key of the machine file, e.g. axes.Y.velocity_ff=0.9")
       ->allow_extra_args(false);
+  run->add_option("--inject", o->injections,
+                  "an effect (X.backlash.gap_um=12; see vcnc effects) or the true value of a "
+                  "declared number (axes.Y.load_kg=550)")
+      ->allow_extra_args(false);
   run->add_option("--bus", o->bus, "hub:// (default), can://INTERFACE or inproc://");
   run->add_option("--pace", o->pace_text, "free (default) or a factor of real time");
   run->add_option("--seed", o->seed_text, "seed of all noise (default 1)");
@@ -89,6 +96,37 @@ void add_analyze(CLI::App& app) {
   });
 }
 
+void add_effects(CLI::App& app) {
+  const auto o = std::make_shared<EffectsOptions>();
+  CLI::App* effects =
+      app.add_subcommand("effects", "what a real machine does besides: all effects there are");
+  effects->add_flag("--json", o->json, "everything about all of them, for scripts");
+  effects->add_flag("--markdown", o->markdown, "the reference page, docs/effects.md");
+  effects->add_subcommand("show", "equation, source, signature and parameters of one")
+      ->add_option("NAME", o->show, "name of an effect, e.g. backlash")
+      ->required();
+  effects->callback([o] { effects_command(*o); });
+}
+
+void add_gallery(CLI::App& app, int& code) {
+  const auto o = std::make_shared<GalleryOptions>();
+  CLI::App* gallery =
+      app.add_subcommand("gallery", "a page with a figure of what every effect looks like");
+  gallery->add_option("--out", o->out, "folder for index.html")->required();
+  gallery->add_option("--only", o->only, "only these effects, by name");
+  gallery->add_option("--machine", o->machine, "machine file; default: the ideal trunnion");
+  gallery->callback([o, &code] { code = gallery_command(*o); });
+}
+
+void add_compare(CLI::App& app, int& code) {
+  const auto o = std::make_shared<CompareOptions>();
+  CLI::App* compare = app.add_subcommand("compare", "two runs side by side");
+  compare->add_option("RUN_A", o->a, "recording or folder of a run")->required();
+  compare->add_option("RUN_B", o->b, "the run to compare it with")->required();
+  compare->add_option("--out", o->out, "also write compare.html with figures into this folder");
+  compare->callback([o, &code] { code = compare_command(*o); });
+}
+
 void add_references(CLI::App& app) {
   app.add_subcommand("keys", "all keys of machine and piece files, as Markdown")->callback([] {
     std::cout << "# Keys of a machine file\n\n"
@@ -110,7 +148,10 @@ int command_line(int argc, char** argv) {
   int code = kExitOk;
   add_run(app, code);
   add_analyze(app);
+  add_gallery(app, code);
+  add_compare(app, code);
   add_program_command(app);
+  add_effects(app);
   add_references(app);
   try {
     app.parse(argc, argv);

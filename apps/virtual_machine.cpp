@@ -10,7 +10,7 @@ namespace vcnc {
 VirtualMachine::VirtualMachine(const Machine& machine, const PieceParams* piece, std::uint64_t seed)
     : truth_(open_local_truth()) {
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    nodes_.push_back(std::make_unique<DriveNode>(axis, machine, *truth_));
+    nodes_.push_back(std::make_unique<DriveNode>(axis, machine, seed, *truth_));
   nodes_.push_back(std::make_unique<SpindleNode>(machine));
   nodes_.push_back(
       std::make_unique<ProbeNode>(machine, piece ? make_piece(*piece) : nullptr, seed, *truth_));

@@ -10,7 +10,11 @@
 #include <initializer_list>
 #include <set>
 #include <sstream>
+#include <stdexcept>
 #include <utility>
+
+#include "configs/spelling.hpp"
+#include "model/parameters.hpp"
 
 namespace vcnc {
 
@@ -27,22 +31,6 @@ std::string where(const toml::node& node) {
 
 [[noreturn]] void fail(const toml::node& node, const std::string& key, const std::string& reason) {
   throw ConfigError(fmt::format("{}: {}: {}", where(node), key, reason));
-}
-
-/// Edit distance, for "did you mean".
-std::size_t distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      diagonal = above;
-    }
-  }
-  return row.back();
 }
 
 /// Reads a TOML table into a struct by visiting its fields.
@@ -112,6 +100,22 @@ class Reader {
   void group(std::string_view key, T& v, const char* doc, Args... args) {
     section(key, doc, [&](Reader& inner) { T::fields(v, inner, args...); });
   }
+  template <class T, class... Args>
+  void effect(std::string_view key, T& v, const char* doc, Args... args) {
+    group(key, v, doc, args...);
+  }
+  template <class T>
+  void list(std::string_view key, std::vector<T>& v, const char*) {
+    const toml::node* n = find(key);
+    if (!n) return;
+    v.clear();
+    for (const toml::node& element : array(*n, full(key), "an array of tables")) {
+      if (!element.is_table()) fail(element, full(key), "expected a table");
+      Reader inner(*element.as_table(), full(key));
+      T::fields(v.emplace_back(), inner);
+      inner.refuse_unknown_keys();
+    }
+  }
   template <class F>
   void section(std::string_view key, const char*, F&& f) {
     static const toml::table kEmpty;
@@ -144,7 +148,7 @@ class Reader {
     const std::string* best = nullptr;
     std::size_t best_cost = ~std::size_t{0};
     for (const std::string& k : known_) {
-      const std::size_t edits = distance(wrong, k);
+      const std::size_t edits = edit_distance(wrong, k);
       const bool same_stem = stem(k) == stem(wrong);
       if (!same_stem && edits > wrong.size() / 3) continue;
       const std::size_t cost = 2 * edits + (same_stem ? 0 : 1);
@@ -260,8 +264,8 @@ toml::table parse_assignment(const std::string& assignment) {
   }
 }
 
-/// What single ranges cannot say.
-void check_whole(const Machine& m, const std::string& name) {
+/// What single ranges cannot say, of the machine as it is written.
+void check_written(const Machine& m, const std::string& name) {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const AxisLimits& l = m.axes[i].limits;
     if (!(l.min < l.max))
@@ -274,7 +278,7 @@ void check_whole(const Machine& m, const std::string& name) {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const AxisEffects& e = m.effects.axis[i];
     const MechanicsParams& mass = m.axes[i].mechanics;
-    if ((e.backlash.gap > 0 || e.windup.compliance > 0) &&
+    if (!(e.get<Backlash>().null() && e.get<Windup>().null()) &&
         mass.reflected_inertia() <= 1e-3 * mass.load)
       throw ConfigError(
           fmt::format("{}: axes.{}.motor_inertia_kgm2: with backlash or windup the motor, seen "
@@ -291,9 +295,60 @@ void check_whole(const Machine& m, const std::string& name) {
                     m.setup.predeflection / unit::mm.to_si, m.probe.range / unit::mm.to_si));
 }
 
+/// The same of the machine as it is, and of what makes it so.
+void check_whole(const Machine& m, const std::string& name) {
+  check_written(m, name);
+  for (std::size_t i = 0; i < m.effects.laws.size(); ++i)
+    if (const std::string objection = m.effects.laws[i].objection(); !objection.empty())
+      throw ConfigError(fmt::format("{}: effects.law {}: {}", name, i + 1, objection));
+  if (m.effects.deviations.empty()) return;
+  Machine is;
+  try {
+    is = actual(m);
+  } catch (const std::invalid_argument& e) {
+    throw ConfigError(fmt::format("{}: effects.deviation: {}", name, e.what()));
+  }
+  check_written(is, name + ": effects.deviation");
+}
+
 }  // namespace
 
-Machine load_machine(const std::string& path, const std::vector<std::string>& assignments) {
+namespace {
+
+/// `--inject KEY=VALUE` as what it means: a key below [effects], or a deviation of a declared
+/// number.
+void inject(toml::table& table, const std::string& injection) {
+  const std::string name = "--inject " + injection;
+  const std::size_t equals = injection.find('=');
+  if (equals == std::string::npos || equals == 0)
+    throw ConfigError(name + ": expected key=value, for example Y.backlash.gap_um=12");
+  const std::string key = injection.substr(0, equals);
+  refuse_deep_lines(injection, name);
+  Machine plain;
+  const std::vector<Parameter> known = parameters(plain);
+  const bool declared_number =
+      !key.starts_with("effects.") &&
+      std::any_of(known.begin(), known.end(), [&](const Parameter& p) { return p.key == key; });
+  if (!declared_number) {
+    merge(table, parse(key.starts_with("effects.") ? injection : "effects." + injection, name));
+    return;
+  }
+  const toml::table value = parse("value = " + injection.substr(equals + 1), name);
+  if (!value["value"].is_number()) throw ConfigError(fmt::format("{}: expected a number", name));
+  toml::table deviation;
+  deviation.insert("key", key);
+  deviation.insert("value", *value["value"].value<double>());
+  toml::table* effects = table.emplace<toml::table>("effects").first->second.as_table();
+  toml::array* all =
+      effects ? effects->emplace<toml::array>("deviation").first->second.as_array() : nullptr;
+  if (!all) throw ConfigError(name + ": effects.deviation is not an array of tables in the file");
+  all->push_back(std::move(deviation));
+}
+
+}  // namespace
+
+Machine load_machine(const std::string& path, const std::vector<std::string>& assignments,
+                     const std::vector<std::string>& injections) {
   toml::table table = parse(read_file(path), path);
   const toml::node* file_piece = table["setup"]["piece"].node();
   fs::path base = file_piece ? fs::absolute(path).parent_path() : fs::current_path();
@@ -302,6 +357,7 @@ Machine load_machine(const std::string& path, const std::vector<std::string>& as
     if (one["setup"]["piece"].node()) base = fs::current_path();
     merge(table, std::move(one));
   }
+  for (const std::string& injection : injections) inject(table, injection);
   Machine machine = read<Machine>(table);
   check_whole(machine, path);
   if (!machine.setup.piece.empty())

@@ -21,10 +21,13 @@ class ConfigError : public InputError {
   using InputError::InputError;
 };
 
-/// Reads a machine file and applies `--set` assignments ("axes.Y.kv_per_s=38") in order. Paths
-/// inside (setup.piece) become absolute: relative to the file, or to the working directory where
-/// they come from an assignment. Throws ConfigError.
-Machine load_machine(const std::string& path, const std::vector<std::string>& assignments = {});
+/// Reads a machine file and applies `--set` assignments ("axes.Y.kv_per_s=38") in order, then
+/// `--inject` ones: effects ("Y.backlash.gap_um=12"), or declared numbers whose true value is
+/// another ("axes.Y.load_kg=550"), which only the simulators learn. Paths inside (setup.piece)
+/// become absolute: relative to the file, or to the working directory where they come from an
+/// assignment. Throws ConfigError.
+Machine load_machine(const std::string& path, const std::vector<std::string>& assignments = {},
+                     const std::vector<std::string>& injections = {});
 
 /// The same for text; `name` stands for the file in messages; paths stay as they are.
 Machine parse_machine(std::string_view toml, const std::string& name);

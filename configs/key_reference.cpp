@@ -49,6 +49,15 @@ class Reference {
   void group(std::string_view key, const T& v, const char* doc, Args... args) {
     section(key, doc, [&](Reference& r) { T::fields(v, r, args...); });
   }
+  /// Effects have pages of their own (docs/effects.md): `vcnc effects` knows their keys.
+  template <class T, class... Args>
+  void effect(std::string_view, const T&, const char*, Args...) {}
+  template <class T>
+  void list(std::string_view key, const std::vector<T>&, const char* doc) {
+    const T element;
+    rows_ += fmt::format("| `[[{}{}]]` | array of tables | [] | {} |\n", path_, key, doc);
+    section(key, doc, [&](Reference& r) { T::fields(element, r); });
+  }
   template <class F>
   void section(std::string_view key, const char*, F&& f) {
     const std::string outer = path_;
@@ -80,7 +89,12 @@ std::string reference_of() {
 
 }  // namespace
 
-std::string machine_key_reference() { return reference_of<Machine>(); }
+std::string machine_key_reference() {
+  return reference_of<Machine>() +
+         "\nEvery effect has keys of its own, `effects.PLACE.NAME.KEY`: "
+         "[effects.md](effects.md), `vcnc effects`.\nThe keys of a law end in the units that "
+         "belong to what it depends on and where it acts, see there.\n";
+}
 std::string piece_key_reference() { return reference_of<PieceParams>(); }
 
 }  // namespace vcnc

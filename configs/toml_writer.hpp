@@ -52,10 +52,26 @@ class TomlWriter {
   void group(std::string_view key, const T& v, const char* doc, Args... args) {
     section(key, doc, [&](TomlWriter& w) { T::fields(v, w, args...); });
   }
+  template <class T, class... Args>
+  void effect(std::string_view key, const T& v, const char* doc, Args... args) {
+    TomlWriter mine, null;
+    T::fields(v, mine, args...);
+    const T by_default{};
+    T::fields(by_default, null, args...);
+    if (mine.lines_ != null.lines_) group(key, v, doc, args...);
+  }
+  template <class T>
+  void list(std::string_view key, const std::vector<T>& v, const char*) {
+    for (const T& element : v) {
+      TomlWriter inner;
+      T::fields(element, inner);
+      tables_ += fmt::format("\n[[{}]]\n{}", full(key), inner.lines_);
+    }
+  }
   template <class F>
   void section(std::string_view key, const char*, F&& f) {
     TomlWriter inner;
-    inner.path_ = path_.empty() ? std::string(key) : path_ + "." + std::string(key);
+    inner.path_ = full(key);
     f(inner);
     if (!inner.lines_.empty()) tables_ += fmt::format("\n[{}]\n{}", inner.path_, inner.lines_);
     tables_ += inner.tables_;
@@ -67,6 +83,9 @@ class TomlWriter {
   static std::string vec(const Vec3& v, Unit u) {
     return fmt::format("[{}, {}, {}]", toml_number(v.x(), u), toml_number(v.y(), u),
                        toml_number(v.z(), u));
+  }
+  std::string full(std::string_view key) const {
+    return path_.empty() ? std::string(key) : path_ + "." + std::string(key);
   }
   void line(std::string_view key, const std::string& value) {
     lines_ += fmt::format("{} = {}\n", key, value);

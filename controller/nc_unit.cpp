@@ -11,6 +11,7 @@ namespace vcnc {
 
 namespace {
 
+constexpr std::uint64_t kNoSeed = 0;  ///< no effect of the NC unit draws random numbers
 constexpr Tick kStartUpCycles = 200;  ///< the drives must be enabled by then
 constexpr Tick kSettleCycles = 100;   ///< after the last set-point, before the run ends
 constexpr Tick kStopCycles = 5000;    ///< at most this long for a stop in an alarm
@@ -85,6 +86,7 @@ NcUnit::NcUnit(const Machine& machine, const std::string& program, TelemetrySink
     : machine_(machine),
       probe_range_(usable_range(machine.probe)),
       player_(program, machine),
+      shaping_(machine_chain<InterpolationPort>(machine.effects, kNoSeed)),
       sink_(sink) {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     planned_.step.position[i] = machine.axes[i].limits.start;
@@ -176,8 +178,12 @@ void NcUnit::advance(Tick k) {
         [](const DriveStatus& d) { return drive_state(d) == cia402::State::operation_enabled; });
     if (enabled) state_ = NcState::running;
   }
-  if (state_ == NcState::running || state_ == NcState::dwell) {
+  if (state_ == NcState::done) {  // at rest, but a filter settles
     planned_.step = player_.step();
+    shape(k);
+  } else if (state_ == NcState::running || state_ == NcState::dwell) {
+    planned_.step = player_.step();
+    shape(k);
     state_ = planned_.step.done    ? NcState::done
              : planned_.step.dwell ? NcState::dwell
                                    : NcState::running;
@@ -192,6 +198,15 @@ void NcUnit::advance(Tick k) {
     planned_.step.spindle = PlayerStep::Spindle::off;
   }
   planned_.state = state_;
+}
+
+/// What becomes of the planned set-points on their way out.
+void NcUnit::shape(Tick k) {
+  if (shaping_.empty()) return;
+  InterpolationPort::Signal<double> signal{planned_.step.position, planned_.step.velocity};
+  shaping_.step(signal, {{seconds(k), kCycle, k}});
+  planned_.step.position = signal.position;
+  planned_.step.velocity = signal.velocity;
 }
 
 void NcUnit::command(Tick k, Frames& out) {

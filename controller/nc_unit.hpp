@@ -19,6 +19,7 @@
 #include "bus/node.hpp"
 #include "bus/telemetry.hpp"
 #include "controller/player.hpp"
+#include "model/effects/chain.hpp"
 #include "model/machine.hpp"
 #include "model/probe/contact.hpp"
 
@@ -26,7 +27,8 @@ namespace vcnc {
 
 class NcUnit : public Master {
  public:
-  /// Checks the program (throws ProgramError). `sink` outlives the unit.
+  /// `machine` as the unit knows it: see as_nc_believes(). Checks the program (throws
+  /// ProgramError). `sink` outlives the unit.
   NcUnit(const Machine& machine, const std::string& program, TelemetrySink& sink);
 
   bool step(Tick k, std::span<const Frame> answers, Frames& out) override;
@@ -54,6 +56,7 @@ class NcUnit : public Master {
   void latch(Tick k, std::span<const Frame> answers);
   void supervise(Tick k);
   void advance(Tick k);
+  void shape(Tick k);
   void command(Tick k, Frames& out);
   void sample(Tick k);
   void raise(Tick k, Code code, std::string source, std::string text);
@@ -62,6 +65,7 @@ class NcUnit : public Master {
   Machine machine_;
   UsableRange probe_range_;
   Player player_;
+  Chain<InterpolationPort> shaping_;  ///< of the set-points
   TelemetrySink& sink_;
 
   NcState state_ = NcState::starting;

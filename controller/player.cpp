@@ -10,6 +10,7 @@
 #include "controller/gcode.hpp"
 #include "controller/path.hpp"
 #include "controller/planner.hpp"
+#include "model/effects/chain.hpp"
 
 namespace vcnc {
 namespace {
@@ -19,7 +20,9 @@ constexpr std::size_t kMostMoves = 50'000;
 constexpr double kLongestWay = 200;       ///< [m] of the controlled point
 constexpr double kLongestSeconds = 3600;  ///< at the programmed feed
 constexpr double kExactCorner = 1.0 * kDegree;
-constexpr double kOrientSeconds = 0.2;  ///< from a standing spindle into its M19 position
+constexpr double kLargestChord = 2 * kPi / 3;  ///< angle of a chord
+constexpr int kMostChords = 20'000;            ///< per arc
+constexpr double kOrientSeconds = 0.2;         ///< from a standing spindle into its M19 position
 
 /// About how far the controlled point goes in a move [m].
 double way_of(const Move& move) {
@@ -95,16 +98,36 @@ bool continues(const Move& a, const Move& b) {
   return !(a.exact || b.exact) || corner(a, b) <= kExactCorner;
 }
 
+/// Replaces an arc by chords no higher than `sagitta`.
+void add_chords(const Move& arc, double sagitta, std::vector<Move>& moves) {
+  const PathSegment segment = make_segment(arc, 0);
+  const double radius = std::max(segment.radius0, segment.radius1);
+  const double half = std::acos(std::max(1 - sagitta / radius, std::cos(0.5 * kLargestChord)));
+  const double count = std::ceil(std::abs(arc.arc.sweep) / (2 * half) - 1e-6);
+  const int chords = static_cast<int>(std::clamp<double>(count, 1, kMostChords));
+  Move chord = arc;
+  chord.kind = Move::Kind::line;
+  chord.arc = {};
+  if (chord.feed_mode == Move::Feed::time) chord.feed /= chords;
+  for (int i = 1; i <= chords; ++i) {
+    chord.start = i == 1 ? arc.start : chord.end;
+    chord.end = i == chords ? arc.end : programmed_point(segment, segment.length * i / chords).x;
+    moves.push_back(chord);
+  }
+}
+
 }  // namespace
 
 struct Player::State {
   State(const std::string& file, const Machine& the_machine)
       : machine(the_machine), program(file, the_machine) {
     for (std::size_t i = 0; i < kAxisCount; ++i) step.position[i] = machine.axes[i].limits.start;
+    machine_chain<PlanPort>(machine.effects, 0).step(allowed, {});
   }
 
   const Machine machine;
   GcodeInterpreter program;
+  PlanPort::Signal<double> allowed;
   std::optional<Block> pending;  ///< read, not yet played
   std::optional<Trajectory> run;
   Tick cycle = 0, cycles = 0;  ///< within the run or the dwell
@@ -130,10 +153,26 @@ struct Player::State {
       way += way_of(moves.back());
       time += seconds_of(moves.back());
     }
-    Path path(std::move(moves), machine.nc.angle_tolerance);
+    Path path(as_allowed(std::move(moves)), machine.nc.angle_tolerance);
     if (path.segments().empty()) return;
     run.emplace(std::move(path), machine);
     begin_wait(run->duration());
+  }
+
+  /// The moves of a run with what the planner allows itself.
+  std::vector<Move> as_allowed(std::vector<Move> moves) const {
+    for (Move& move : moves)
+      if (!move.exact) move.tolerance += allowed.blend_tolerance;
+    if (!(allowed.sagitta > 0)) return moves;
+    std::vector<Move> result;
+    result.reserve(moves.size());
+    for (Move& move : moves) {
+      if (move.kind == Move::Kind::arc)
+        add_chords(move, allowed.sagitta, result);
+      else
+        result.push_back(std::move(move));
+    }
+    return result;
   }
 
   void begin_wait(double seconds) {

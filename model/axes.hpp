@@ -17,6 +17,12 @@ constexpr bool is_rotary(std::size_t axis) { return axis >= kA; }
 template <class T>
 using PerAxis = std::array<T, kAxisCount>;
 
+/// The two directions across linear axis `axis`, in the order X, Y, Z: of X these are Y and Z.
+struct Sideways {
+  int first, second;
+};
+constexpr Sideways sideways(std::size_t axis) { return {axis == kX ? 1 : 0, axis == kZ ? 1 : 2}; }
+
 /// Positions [m, m, m, rad, rad] or their time derivatives.
 using AxisVector = PerAxis<double>;
 

@@ -23,6 +23,8 @@
 //   visit.choice(key, Enum&, {{"name", Enum::value}, ...}, doc)
 //   visit.group(key, T&, doc, args...)           nested struct: T::fields(t, visit, args...)
 //   visit.section(key, doc, f)                   nested table: f(visitor)
+//   visit.effect(key, E&, doc, args...)          as group; written only where not as by default
+//   visit.list(key, std::vector<T>&, doc)        array of tables: T::fields(t, visit) each
 #pragma once
 
 #include <limits>

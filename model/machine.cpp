@@ -1,6 +1,9 @@
 #include "model/machine.hpp"
 
 #include <stdexcept>
+#include <string_view>
+
+#include "model/parameters.hpp"
 
 namespace vcnc {
 
@@ -12,7 +15,6 @@ Machine::Machine() {
         .min = -2 * kPi, .max = 2 * kPi, .velocity = 3.5, .acceleration = 15, .jerk = 150};
     axis.mechanics = {
         .load = 2, .motor_inertia = 0.5, .travel_per_turn = 2 * kPi, .force_limit = 500};
-    effects.axis[i].friction.stribeck_velocity = 0.02;
   }
 }
 
@@ -25,8 +27,34 @@ double Machine::tool_length(int h) const {
 }
 
 Machine declared(Machine machine) {
-  machine.effects = Machine().effects;
+  machine.effects = Effects();
   return machine;
+}
+
+Machine actual(Machine machine) {
+  for (const Deviation& deviation : machine.effects.deviations) {
+    if (deviation.key.starts_with("effects."))
+      throw std::invalid_argument(deviation.key + ": an effect is given under its own key");
+    set_parameter(machine, deviation.key, deviation.value);
+  }
+  return machine;
+}
+
+Machine as_nc_believes(const Machine& machine) {
+  const auto own = [](std::string_view key) {
+    const bool limit = key.find(".velocity_mm_s") != key.npos ||
+                       key.find(".velocity_deg_s") != key.npos ||
+                       key.find(".acceleration_mm_s2") != key.npos ||
+                       key.find(".acceleration_deg_s2") != key.npos ||
+                       key.find(".jerk_mm_s3") != key.npos || key.find(".jerk_deg_s3") != key.npos;
+    return key.starts_with("nc.") || (key.starts_with("axes.") && limit);
+  };
+  Machine nc = declared(machine);
+  for (const Deviation& deviation : machine.effects.deviations)
+    if (own(deviation.key)) set_parameter(nc, deviation.key, deviation.value);
+  nc.effects.take(machine.effects, Place::nc);
+  nc.effects.simulate_null = machine.effects.simulate_null;
+  return nc;
 }
 
 }  // namespace vcnc

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "model/axes.hpp"
+#include "model/effects/effects.hpp"
 #include "model/fields.hpp"
 
 namespace vcnc {
@@ -260,121 +261,6 @@ struct SetupParams {
   }
 };
 
-// ---------------------------------------------------------------------------------- effects
-
-struct BacklashParams {
-  double gap = 0;  ///< [m or rad]
-  template <class Self, class Visit>
-  static void fields(Self& p, Visit& visit, bool rotary) {
-    visit(rotary ? "gap_arcsec" : "gap_um", p.gap, rotary ? unit::arcsec : unit::um, Range{0, 2000},
-          "lost motion between motor and load");
-  }
-};
-
-/// Wind-up of screw, nut and bearings (or of the gear): a spring between motor and load.
-struct WindupParams {
-  double compliance = 0;        ///< [m/N] or [rad/(N m)]; 0 = rigid
-  double damping_ratio = 0.05;  ///< of the free resonance
-  template <class Self, class Visit>
-  static void fields(Self& p, Visit& visit, bool rotary) {
-    visit(rotary ? "compliance_urad_per_Nm" : "compliance_nm_per_N", p.compliance,
-          rotary ? Unit{"urad_per_Nm", 1e-6} : Unit{"nm_per_N", 1e-9}, Range{0, 1000},
-          "elastic compliance between motor and load, 0 = rigid");
-    visit("damping_ratio", p.damping_ratio, unit::none, Range{0, 1}, "of the free resonance");
-  }
-};
-
-/// Guideway friction on the load. Equations: model/drive/friction.hpp.
-struct FrictionParams {
-  double coulomb = 0;               ///< Fc [N or N m]
-  double breakaway = 0;             ///< Fs, at least Fc to have an effect
-  double stribeck_velocity = 2e-3;  ///< [m/s or rad/s]
-  double viscous = 0;               ///< [N s/m or N m s/rad]
-  double presliding_stiffness = 0;  ///< LuGre sigma0; 0 = static Stribeck law
-  double presliding_damping = 0;    ///< LuGre sigma1
-  template <class Self, class Visit>
-  static void fields(Self& p, Visit& visit, bool rotary) {
-    const Unit force = rotary ? unit::newton_m : unit::newton;
-    visit(rotary ? "coulomb_Nm" : "coulomb_N", p.coulomb, force, Range{0, 1e5}, "sliding friction");
-    visit(rotary ? "breakaway_Nm" : "breakaway_N", p.breakaway, force, Range{0, 1e5},
-          "friction at rest; counts where it exceeds the sliding friction");
-    visit(rotary ? "stribeck_velocity_deg_s" : "stribeck_velocity_mm_s", p.stribeck_velocity,
-          rotary ? unit::deg_s : unit::mm_s, Range{1e-3, 1000},
-          "velocity over which break-away fades");
-    visit(rotary ? "viscous_Nms_per_rad" : "viscous_Ns_per_m", p.viscous,
-          rotary ? unit::nm_s_per_rad : unit::n_s_per_m, Range{0, 1e6}, "viscous friction");
-    visit(rotary ? "presliding_stiffness_Nm_per_rad" : "presliding_stiffness_N_per_um",
-          p.presliding_stiffness, rotary ? unit::nm_per_rad : unit::n_per_um, Range{0, 1e9},
-          "LuGre bristle stiffness, 0 = no pre-sliding");
-    visit(rotary ? "presliding_damping_Nms_per_rad" : "presliding_damping_Ns_per_m",
-          p.presliding_damping, rotary ? unit::nm_s_per_rad : unit::n_s_per_m, Range{0, 1e8},
-          "LuGre bristle damping");
-  }
-};
-
-struct EncoderParams {
-  double quantum = 0;  ///< [m or rad]; 0 = continuous
-  template <class Self, class Visit>
-  static void fields(Self& p, Visit& visit, bool rotary) {
-    visit(rotary ? "quantum_arcsec" : "quantum_nm", p.quantum, rotary ? unit::arcsec : unit::nm,
-          Range{0, 1e5}, "resolution of the measuring system, 0 = continuous");
-  }
-};
-
-struct AxisEffects {
-  BacklashParams backlash;
-  WindupParams windup;
-  FrictionParams friction;
-  EncoderParams encoder;
-  template <class Self, class Visit>
-  static void fields(Self& p, Visit& visit, bool rotary) {
-    visit.group("backlash", p.backlash, "lost motion", rotary);
-    visit.group("windup", p.windup, "elastic wind-up", rotary);
-    visit.group("friction", p.friction, "guideway friction", rotary);
-    visit.group("encoder", p.encoder, "measuring system", rotary);
-  }
-};
-
-/// Probe and acquisition effects; three-component members are for the probe's x, y, z channels.
-struct ProbeEffects {
-  double surface_friction = 0;     ///< Coulomb coefficient between ball and piece
-  double return_to_zero = 0;       ///< half width of the hysteresis of the suspension [m]
-  Vec3 cos_offset = Vec3::Zero();  ///< share of the amplitude
-  Vec3 sin_offset = Vec3::Zero();  ///< share of the amplitude
-  Vec3 sin_gain = Vec3::Zero();    ///< amplitude of sin over amplitude of cos, minus one
-  Vec3 phase = Vec3::Zero();       ///< quadrature error [rad]
-  double adc_noise = 0;            ///< [V] rms
-  double adc_jitter = 0;           ///< [s] rms
-
-  template <class Self, class Visit>
-  static void fields(Self& p, Visit& visit) {
-    visit("surface_friction", p.surface_friction, unit::none, Range{0, 1},
-          "Coulomb friction of ball on piece");
-    visit("return_to_zero_um", p.return_to_zero, unit::um, Range{0, 50},
-          "hysteresis of the suspension");
-    visit("cos_offset_percent", p.cos_offset, Unit{"percent", 0.01}, Range{-50, 50},
-          "offset of cos, of its amplitude");
-    visit("sin_offset_percent", p.sin_offset, Unit{"percent", 0.01}, Range{-50, 50},
-          "offset of sin, of its amplitude");
-    visit("sin_gain_percent", p.sin_gain, Unit{"percent", 0.01}, Range{-50, 50},
-          "amplitude of sin against cos");
-    visit("phase_deg", p.phase, unit::deg, Range{-30, 30}, "quadrature error");
-    visit("adc_noise_mV", p.adc_noise, unit::mv, Range{0, 100}, "converter noise, rms");
-    visit("adc_jitter_us", p.adc_jitter, unit::us, Range{0, 50}, "sampling jitter, rms");
-  }
-};
-
-struct Effects {
-  PerAxis<AxisEffects> axis;
-  ProbeEffects probe;
-  template <class Self, class Visit>
-  static void fields(Self& p, Visit& visit) {
-    for (std::size_t i = 0; i < kAxisCount; ++i)
-      visit.group(kAxisNames[i], p.axis[i], "effects of one axis", is_rotary(i));
-    visit.group("probe", p.probe, "probe and acquisition effects");
-  }
-};
-
 // ---------------------------------------------------------------------------------- machine
 
 struct Machine {
@@ -410,7 +296,17 @@ struct Machine {
   }
 };
 
-/// The machine as declared: the same machine with every effect at its null value.
+/// The machine as declared: the same machine with every effect at its null value. All that the
+/// analysis is ever given.
 Machine declared(Machine machine);
+
+/// The machine as it is: every deviation applied to the parameter it names. What the simulators
+/// build. Throws std::invalid_argument where a deviation names no number or is out of its range.
+Machine actual(Machine machine);
+
+/// What the NC unit has: the declared machine, but with those deviations that are in its own
+/// settings ([nc] and the velocity, acceleration and jerk limits of the axes), and with the effects
+/// of [effects.nc].
+Machine as_nc_believes(const Machine& machine);
 
 }  // namespace vcnc

@@ -7,9 +7,23 @@ namespace vcnc {
 
 namespace {
 
-AxisVector start_position(const Machine& machine) {
+constexpr double kSampleTime = kCycle / kLoopStepsPerCycle;
+
+/// Where the axes truly stand at switch-on: off their scales by what the drives will say from the
+/// first cycle on, so that the probe does not see a jump.
+AxisVector start_position(const Machine& machine, std::uint64_t seed) {
+  Motions<double> motions{};
+  for (std::size_t i = 0; i < kAxisCount; ++i) motions[i].position = machine.axes[i].limits.start;
   AxisVector q;
-  for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = machine.axes[i].limits.start;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    q[i] = motions[i].position;
+    Chain<DisplacementPort> displacing = axis_chain<DisplacementPort>(machine.effects, i, seed);
+    if (displacing.empty()) continue;
+    DisplacementPort::Signal<double> signal;
+    displacing.step(
+        signal, {.moment = {0, kSampleTime, 0}, .load = motions[i], .force = 0, .axes = &motions});
+    q[i] += signal.displacement;
+  }
   return q;
 }
 
@@ -27,29 +41,63 @@ bool overtravelled(const ProbeParams& probe, const Vec3& deflection) {
 
 ProbeNode::ProbeNode(const Machine& machine, std::unique_ptr<Piece> piece, std::uint64_t seed,
                      TruthPort& truth)
+    : ProbeNode(vcnc::actual(machine), std::move(piece), seed, truth, machine.probe) {}
+
+ProbeNode::ProbeNode(const Machine& machine, std::unique_ptr<Piece> piece, std::uint64_t seed,
+                     TruthPort& truth, const ProbeParams& declared)
     : probe_(machine.probe),
-      range_(usable_range(machine.probe)),
+      range_(usable_range(declared)),
       kinematics_(machine.kinematics, machine.probe.length, machine.setup.work_offset[0]),
       piece_(std::move(piece)),
-      contact_(machine.probe, machine.effects.probe, piece_.get()),
-      channels_{SignalChannel(machine.probe, machine.effects.probe, 0, seed),
-                SignalChannel(machine.probe, machine.effects.probe, 1, seed),
-                SignalChannel(machine.probe, machine.effects.probe, 2, seed)},
+      contact_(machine.probe, machine_chain<TouchPort>(machine.effects, seed), piece_.get()),
+      channels_{
+          SignalChannel(machine.probe, 0, machine_chain<AnaloguePort>(machine.effects, seed)),
+          SignalChannel(machine.probe, 1, machine_chain<AnaloguePort>(machine.effects, seed)),
+          SignalChannel(machine.probe, 2, machine_chain<AnaloguePort>(machine.effects, seed))},
+      errors_(machine_chain<PosePort>(machine.effects, seed)),
+      feeling_(machine_chain<DeflectionPort>(machine.effects, seed)),
+      counting_(machine_chain<ReadingPort>(machine.effects, seed)),
       truth_(truth),
-      start_(start_position(machine)) {}
+      start_(start_position(machine, seed)) {}
 
-ToolPose ProbeNode::pose(const std::array<TruthCycle, kTruthAxes>& truth,
-                         std::size_t sample) const {
-  AxisVector q;
-  for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = truth[i].position[sample];
-  return kinematics_.forward(q);
+/// Positions, velocities and accelerations of the axes from the last samples.
+void ProbeNode::follow_motion(const AxisVector& q) {
+  motion_.moment = {static_cast<double>(samples_) * kSampleTime, kSampleTime, samples_};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    Motion<double>& m = motion_.axes[i];
+    const double velocity = samples_ > 0 ? (q[i] - m.position) / kSampleTime : 0;
+    m = {q[i], velocity, samples_ > 1 ? (velocity - m.velocity) / kSampleTime : 0};
+  }
 }
 
-void ProbeNode::sample(const ToolPose& pose) {
-  const Vec3 deflection = contact_.step(pose);
+ToolPose ProbeNode::pose(const AxisVector& q) {
+  if (!errors_.empty() || !counting_.empty()) follow_motion(q);
+  if (errors_.empty()) return kinematics_.forward(q);
+  motion_.arm = kinematics_.arms(q);
+  GeometryErrors<double> errors;
+  errors_.step(errors, motion_);
+  return kinematics_.forward(q, errors);
+}
+
+void ProbeNode::sample(const AxisVector& q) {
+  const Moment now{static_cast<double>(samples_) * kSampleTime, kSampleTime, samples_};
+  Vec3 deflection = contact_.step(pose(q));
   overtravelled_ = overtravelled(probe_, deflection);
+  if (!feeling_.empty()) {
+    DeflectionPort::Signal<double> signal{deflection};
+    feeling_.step(signal, {now, probe_.spring_rate});
+    deflection = signal.deflection;
+  }
   for (std::size_t c = 0; c < channels_.size(); ++c)
     last_[c] = channels_[c].sample(deflection[static_cast<Eigen::Index>(c)]);
+  if (!counting_.empty()) {
+    ReadingPort::Signal<double> signal{
+        {last_[0].deflection, last_[1].deflection, last_[2].deflection}};
+    counting_.step(signal, {now, probe_.signal_period, &motion_.axes});
+    for (std::size_t c = 0; c < last_.size(); ++c)
+      last_[c].deflection = signal.deflection[static_cast<Eigen::Index>(c)];
+  }
+  ++samples_;
 }
 
 ProbeSample ProbeNode::reading(Tick k) const {
@@ -70,12 +118,16 @@ ProbeSample ProbeNode::reading(Tick k) const {
 
 void ProbeNode::step(Tick k, std::span<const Frame>, Frames& out) {
   if (k == 0) {
-    sample(kinematics_.forward(start_));
+    sample(start_);
   } else {
     std::array<TruthCycle, kTruthAxes> truth;
     if (!truth_.collect(k - 1, truth))  // a failure of the host, not of the machine
       throw TruthError("the true motion of cycle " + std::to_string(k - 1) + " did not arrive");
-    for (std::size_t j = 0; j < kLoopStepsPerCycle; ++j) sample(pose(truth, j));
+    for (std::size_t j = 0; j < kLoopStepsPerCycle; ++j) {
+      AxisVector q;
+      for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = truth[i].position[j];
+      sample(q);
+    }
   }
   out.push_back(encode(reading(k)));
 }

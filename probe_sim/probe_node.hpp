@@ -1,9 +1,9 @@
 // The scanning probe on the bus: contact physics, sin/cos signals, acquisition module.
 //
 // Cycle k: the true axis motion of cycle k-1 comes through the truth channel, ten samples of 100
-// us. For each of them the stylus ball is moved on the piece (ProbeContact) and the three channels
-// are digitised (SignalChannel). The last sample is the deflection at t_k and goes out as
-// ProbeSample.
+// us. For each of them the tool's pose follows from the axes and the errors of the machine's
+// bodies, the stylus ball is moved on the piece (ProbeContact) and the three channels are digitised
+// (SignalChannel). The last sample is the deflection at t_k and goes out as ProbeSample.
 #pragma once
 
 #include <array>
@@ -33,8 +33,11 @@ class ProbeNode : public Node {
   void step(Tick k, std::span<const Frame> inputs, Frames& out) override;
 
  private:
-  ToolPose pose(const std::array<TruthCycle, kTruthAxes>& truth, std::size_t sample) const;
-  void sample(const ToolPose& pose);
+  ProbeNode(const Machine& actual, std::unique_ptr<Piece> piece, std::uint64_t seed,
+            TruthPort& truth, const ProbeParams& declared);
+  ToolPose pose(const AxisVector& q);
+  void sample(const AxisVector& q);
+  void follow_motion(const AxisVector& q);
   ProbeSample reading(Tick k) const;
 
   ProbeParams probe_;
@@ -43,8 +46,13 @@ class ProbeNode : public Node {
   std::unique_ptr<Piece> piece_;
   ProbeContact contact_;
   std::array<SignalChannel, 3> channels_;
+  Chain<PosePort> errors_;
+  Chain<DeflectionPort> feeling_;
+  Chain<ReadingPort> counting_;
   std::array<ChannelSample, 3> last_;
   bool overtravelled_ = false;
+  std::int64_t samples_ = 0;
+  PosePort::Context<double> motion_;  ///< of all axes, where an effect needs it
   TruthPort& truth_;
   AxisVector start_;
 };

@@ -6,11 +6,11 @@ static_assert(kLoopStepsPerCycle == std::tuple_size_v<decltype(AxisCycle::truth)
 static_assert(kDriveLoopSteps == kLoopStepsPerCycle &&
               kDriveLoopSteps * kPlantStepsPerLoop == kPlantStepsPerCycle);
 
-DriveNode::DriveNode(std::size_t axis, const Machine& machine, TruthPort& truth)
+DriveNode::DriveNode(std::size_t axis, const Machine& machine, std::uint64_t seed, TruthPort& truth)
     : axis_(axis),
       name_("drive " + std::string(kAxisNames[axis])),
       quick_stop_deceleration_(machine.axes[axis].limits.acceleration),
-      drive_(machine.axes[axis], machine.effects.axis[axis]),
+      drive_(machine, axis, seed),
       truth_(truth) {}
 
 bool DriveNode::accepts(std::uint16_t cob_id) const {
@@ -64,6 +64,12 @@ void DriveNode::step(Tick k, std::span<const Frame> inputs, Frames& out) {
   const std::size_t first = out.size();
   out.emplace_back();  // the cyclic frame comes first; filled in below
   read(inputs, out);
+  AxisVector positions, velocities;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    positions[i] = command_.axes[i].position;
+    velocities[i] = command_.axes[i].velocity;
+  }
+  if (commanded_) drive_.tell_commands(positions, velocities);
   const AxisCycle cycle = move();
 
   TruthCycle truth{.tick = k, .position = cycle.truth};

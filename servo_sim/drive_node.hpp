@@ -24,8 +24,8 @@ inline constexpr int kSilentCyclesAllowed = 2;
 
 class DriveNode : public Node {
  public:
-  /// `axis` 0..4 in the order X Y Z A C; `truth` outlives the node.
-  DriveNode(std::size_t axis, const Machine& machine, TruthPort& truth);
+  /// `axis` 0..4 in the order X Y Z A C; `seed` of all noise; `truth` outlives the node.
+  DriveNode(std::size_t axis, const Machine& machine, std::uint64_t seed, TruthPort& truth);
 
   int id() const override { return drive_node(axis_); }
   std::string_view name() const override { return name_; }

@@ -28,16 +28,22 @@
 // rule, with K limited to a resonance of 1.6 kHz (10 kN then wind the spring up by less than
 // 0.3 um on 500 kg). Friction implicitly (model/drive/friction.hpp).
 //
-// Valid below about half the loop rate. Not modelled: current ripple, thermal growth, gravity,
-// cross-coupling between axes.
+// Where the effects of model/effects/ act: set-points as received and as used, gains, force of the
+// motor, spring (K, b), further force on the load, friction F_f, the position a measuring system
+// counts, and what the tool centre is off the scale (true position = load + displacement). The
+// controller knows the declared masses; the plant has the actual ones.
+//
+// Valid below about half the loop rate. Not modelled: current ripple, cross-coupling of the plants.
 // Source: Gross, Hamann, Wiegaertner, Electrical Feed Drives in Automation; Altintas et al., CIRP
 // Annals 60/2 (2011) 779; observer gains: the critically damped g-h-k filter of Brookner, Tracking
 // and Kalman Filtering Made Easy.
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "model/drive/friction.hpp"
+#include "model/effects/chain.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {
@@ -76,8 +82,11 @@ class VelocityObserver {
 
 class AxisDrive {
  public:
+  /// One axis of a machine with its effects, laws and deviations; `seed` of all noise.
   /// Throws std::invalid_argument naming the key when wind-up or backlash lack a motor inertia.
-  AxisDrive(const AxisParams& params, const AxisEffects& effects);
+  AxisDrive(const Machine& machine, std::size_t axis, std::uint64_t seed);
+  /// A linear axis on its own, as declared.
+  explicit AxisDrive(const AxisParams& params, const AxisEffects& effects = {});
 
   /// Follows the set-point through one bus cycle (closed loop).
   AxisCycle follow(const AxisSetpoint& target);
@@ -87,6 +96,10 @@ class AxisDrive {
   /// commanded velocity drops to zero at once.
   AxisCycle hold();
 
+  /// Commanded positions and velocities of all axes for the end of the coming cycle: what a law of
+  /// this axis may know of the others. Call it before follow().
+  void tell_commands(const AxisVector& position, const AxisVector& velocity);
+
   bool standing() const;  ///< commanded and measured velocity are (nearly) zero
   double position() const { return setpoint_.position; }
 
@@ -94,24 +107,54 @@ class AxisDrive {
   /// Set-points at the loop instants of a cycle, its beginning and its end included.
   using Course = std::array<AxisSetpoint, kDriveLoopSteps + 1>;
 
+  AxisDrive(const AxisParams& declared, const AxisParams& actual, const Effects& effects,
+            std::size_t axis, std::uint64_t seed);
+  void couple(const TransmissionPort::Signal<double>& transmission);
   AxisCycle run(const Course& course);
+  AxisSetpoint shaped(const AxisSetpoint& setpoint, double acceleration, int step);
   double control(const AxisSetpoint& now, const AxisSetpoint& next);
   void move_plant();
-  void move_two_masses();
-  double encoder(double position) const;
+  void move_rigid(double force, double load_force);
+  void move_two_masses(double force, double load_force);
+  double rub(double v, double v_free, double inertia);
+  double displaced(double velocity_before);
+  double encoder(double position);
+  Moment moment(double dt, int steps_per_loop, int step) const;
+  void update_motions(int steps_ahead);
 
-  AxisParams params_;
-  AxisEffects effects_;
+  std::size_t axis_;
+  ServoParams::Feedback feedback_;
+  MechanicsParams declared_, actual_;
   AxisSetpoint setpoint_;
 
   // Constants of the loops and the plant.
-  double inertia_, motor_inertia_, kp_, lag_share_;
-  bool two_masses_;
-  double stiffness_ = 0, damping_ = 0;
+  double inertia_;  ///< what the controller takes it to be
+  double plant_inertia_, motor_inertia_;
+  ServoPort::Signal<double> servo_;
+  double kp_, lag_share_;
+  bool two_masses_ = false;
+  double stiffness_ = 0, damping_ = 0, half_gap_ = 0;
+
+  // Effects.
+  Chain<ReceptionPort> reception_;
+  Chain<SetpointPort> shaping_;
+  Chain<EncoderPort> counting_;
+  Chain<MotorForcePort> motor_;
+  Chain<LoadForcePort> load_;
+  Chain<FrictionPort> rubbing_;
+  Chain<DisplacementPort> displacing_;
+  bool laws_;          ///< some law needs motions_
+  bool told_ = false;  ///< tell_commands() was called
 
   // State.
-  double x_load_, v_load_ = 0, x_motor_, v_motor_ = 0;
-  double force_ref_ = 0, force_ = 0, integral_ = 0;
+  std::int64_t cycle_ = 0;
+  int loop_ = 0;  ///< within the cycle
+  int plant_step_ = 0;
+  double x_load_, v_load_ = 0, a_load_ = 0, x_motor_, v_motor_ = 0;
+  double force_ref_ = 0, force_ = 0, integral_ = 0, load_force_ = 0;
+  AxisSetpoint last_raw_, last_shaped_;
+  AxisVector told_position_{}, told_velocity_{}, before_position_{}, before_velocity_{};
+  Motions<double> motions_{};
   Friction friction_;
   VelocityObserver observer_;
 };

@@ -13,6 +13,13 @@ double nearest_turn(double angle, double reference) {
   return angle + 2 * kPi * std::round((reference - angle) / (2 * kPi));
 }
 
+/// Rotation by the vector t: about its direction by its length [rad].
+Mat3 rot_vector(const Vec3& t) {
+  const double angle = t.norm();
+  if (angle == 0) return Mat3::Identity();
+  return Eigen::AngleAxisd(angle, t / angle).toRotationMatrix();
+}
+
 }  // namespace
 
 Kinematics::Kinematics(const KinematicsParams& params, double tool_length, const Vec3& p_MW)
@@ -50,6 +57,45 @@ ToolPose Kinematics::forward(const AxisVector& q) const {
     pose.p_WT = p_M - p_MW_ + Rz * (k.p_CA + Rx * p_AT_) - k.p_CA - p_AT_;
   }
   return pose;
+}
+
+ToolPose Kinematics::forward(const AxisVector& q, const GeometryErrors<double>& e) const {
+  const RotaryPair iso = counted({q[kA], q[kC]});
+  const KinematicsParams& k = params_;
+  const Mat3 T_A = rot_vector(e.a_tilt), T_C = rot_vector(e.c_tilt);
+  const Mat3 Rx = T_A * rot_x(iso.a) * T_A.transpose();
+  const Mat3 Rz = T_C * rot_z(iso.c) * T_C.transpose();
+  const Mat3 turn = rot_vector(e.tool_turn);
+  const Vec3 longer = e.tool_longer * (turn * Vec3::UnitZ());
+  const Vec3 p_M = Vec3(q[kX], q[kY], q[kZ] - tool_length_) + e.tip;
+  ToolPose pose;
+  if (k.type == KinematicsParams::Type::trunnion) {
+    const Vec3 p_MA = k.p_MA + e.a_shift, p_MC = k.p_MC + e.c_shift;
+    pose.R_WT = Rz * Rx * turn;
+    pose.p_WT =
+        Rz * (Rx * (p_M - longer - p_MA - e.a_run) - (p_MC - p_MA) - e.c_run) + p_MC - p_MW_;
+  } else {
+    // The head's arm from the C axis' line over the A axis' line to the tip.
+    const Vec3 p_A = k.p_CA + e.a_shift;
+    const Vec3 to_tip = p_AT_ - e.a_shift;
+    pose.R_WT = turn * Rz * Rx;
+    pose.p_WT = p_M - p_MW_ + Rz * (p_A + e.a_run + Rx * to_tip - e.c_shift) + e.c_shift + e.c_run -
+                k.p_CA - p_AT_ - e.tool_longer * (pose.R_WT * Vec3::UnitZ());
+  }
+  const Mat3 piece = rot_vector(e.piece_tilt).transpose();
+  pose.p_WT = piece * (pose.p_WT - e.piece_shift);
+  pose.R_WT = piece * pose.R_WT;
+  return pose;
+}
+
+std::array<Vec3, 3> Kinematics::arms(const AxisVector& q) const {
+  Vec3 tip(q[kX], q[kY], q[kZ] - tool_length_);
+  if (params_.type == KinematicsParams::Type::head) {
+    const RotaryPair iso = counted({q[kA], q[kC]});
+    tip += rot_z(iso.c) * (params_.p_CA + rot_x(iso.a) * p_AT_) - params_.p_CA - p_AT_;
+  }
+  return {Vec3(tip.x() - q[kX], tip.y(), tip.z()), Vec3(tip.x() - q[kX], tip.y() - q[kY], tip.z()),
+          Vec3(tip.x() - q[kX], tip.y() - q[kY], tip.z() - q[kZ])};
 }
 
 Eigen::Matrix<double, 3, 5> Kinematics::jacobian(const AxisVector& q) const {

@@ -17,7 +17,10 @@
 // Source: ISO 841; closed forms by hand, rigid axes without errors.
 #pragma once
 
+#include <array>
+
 #include "model/axes.hpp"
+#include "model/effects/ports.hpp"
 #include "model/machine.hpp"
 #include "model/math.hpp"
 
@@ -45,6 +48,19 @@ class Kinematics {
 
   /// Where the controlled point is, and how the tool stands, for axis positions q.
   ToolPose forward(const AxisVector& q) const;
+
+  /// The same on a machine with errors; with all errors zero the same to the last bit. Every body
+  /// moves as a whole, without a first-order approximation:
+  ///   tip        p_M' = p_M + tip - tool_longer R_M d,   tool turned by R(tool_turn)
+  ///   rotary     a line with shift s and tilt t turns by R(t) Rx R(t)^T about the point + s,
+  ///              what it turns is displaced by run
+  ///   piece      p_W = R(piece_tilt)^T (p - piece_shift)
+  /// R(t) is the rotation by the vector t [rad]. Source: the names and the first-order form are
+  /// those of ISO 230-1 and ISO 230-7 (location errors of axes), composed as rigid motions.
+  ToolPose forward(const AxisVector& q, const GeometryErrors<double>& errors) const;
+
+  /// From the carriages of X, Y and Z to the tool tip, machine frame (PosePort::Context::arm).
+  std::array<Vec3, 3> arms(const AxisVector& q) const;
 
   /// d p_WT / d q: columns per axis, [m/m] and [m/rad].
   Eigen::Matrix<double, 3, 5> jacobian(const AxisVector& q) const;

@@ -20,6 +20,11 @@
 // Across the normal it lags by m a / k behind a tool that accelerates with a along the surface:
 // 15 um at 0.3 m/s^2.
 //
+// Radius, friction mu and hysteresis may be changed by effects (TouchPort), also with the direction
+// of the surface. An effect may also lift the piece off the ball; when that ends, the surface comes
+// back under the ball: the depth in which the ball lies then decays with 20 ms, slowly enough that
+// damper and spring keep the ball on it (2 zeta sqrt(k/m) > 1/20 ms) and no period is lost.
+//
 // With return_to_zero h the free ball may come to rest anywhere within +-h. Gravity does not
 // deflect the ball (the rest position is the zero of the probe), it takes away range: see
 // usable_range.
@@ -29,8 +34,8 @@
 //   along; what is left are the centrifugal force m w^2 |delta| and the Coriolis force
 //   2 m w |delta'| on m = 65 g. At w = 164 deg/s, |delta| = 2 mm, |delta'| = 50 mm/s they are at
 //   most 1.1 mN + 18.6 mN against 662 mN of the spring at 0.5 mm, the second only in lift-off.
-// - Bending of the stylus: 57 nm at 0.65 N (carbide, 50 mm x 2 mm), proportional to the deflection
-//   and hence part of the calibration.
+// - Bending of the stylus: 88 um/N (carbide, 50 mm x 2 mm: L^3/(3 E I)), proportional to the
+//   deflection and hence part of the calibration; see the effect stylus_bending.
 // - Elasticity of the contact (Hertz, below 0.5 um at 0.65 N), and a suspension that is not equally
 //   stiff in all directions.
 // - End stops: the deflection goes on beyond the range and beyond overtravel as driven.
@@ -46,6 +51,9 @@
 //   }
 #pragma once
 
+#include <cstdint>
+
+#include "model/effects/chain.hpp"
 #include "model/geometry/kinematics.hpp"
 #include "model/geometry/piece.hpp"
 #include "model/machine.hpp"
@@ -70,8 +78,9 @@ UsableRange usable_range(const ProbeParams& probe);
 
 class ProbeContact {
  public:
-  /// `piece` may be null (nothing to touch) and must outlive the contact.
-  ProbeContact(const ProbeParams& probe, const ProbeEffects& effects, const Piece* piece);
+  /// `piece` may be null (nothing to touch) and must outlive the contact; `effects` are those on
+  /// the ball and its contact.
+  ProbeContact(const ProbeParams& probe, Chain<TouchPort> effects, const Piece* piece);
 
   /// Advances by one step of 100 us to the instant in which the tool has this pose; returns the
   /// true deflection in the probe frame [m]. The first call places the ball: at rest, at its zero
@@ -87,12 +96,18 @@ class ProbeContact {
 
  private:
   void place(const ToolPose& pose);
+  void feel(const ToolPose& pose);
+  void put_back();
   void touch(double inertia, Vec3& v);
 
   ProbeParams probe_;
-  ProbeEffects effects_;
+  Chain<TouchPort> effects_;
+  TouchPort::Signal<double> ball_;  ///< radius, friction, ... at this step
+  std::int64_t steps_ = 0;
   const Piece* piece_;
   double mass_, damping_;
+  bool lifted_ = false;         ///< at the last step
+  double sunk_ = 0;             ///< how far the surface is still below its place after lifting [m]
   Vec3 p_ = Vec3::Zero();       ///< ball centre
   Vec3 v_ = Vec3::Zero();       ///< its velocity
   Vec3 p_tool_ = Vec3::Zero();  ///< controlled point at the last step

@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "model/probe/noise.hpp"
+#include <utility>
 
 namespace vcnc {
 namespace {
@@ -12,7 +11,6 @@ constexpr double kSampleTime = 100e-6;  // [s]
 constexpr double kNominalAmplitude = 0.5;
 constexpr double kLeastShare = 0.6, kMostShare = 1.4;  // of the amplitude
 constexpr double kLargestStep = 0.8 * kPi, kLargestChange = 0.5 * kPi;
-constexpr std::uint64_t kAdcNoiseStream = 0x100, kAdcJitterStream = 0x200;
 
 double wrap(double angle) { return angle - 2 * kPi * std::round(angle / (2 * kPi)); }
 
@@ -45,34 +43,24 @@ double Unwrapper::step(double phase) {
   return total_;
 }
 
-SignalChannel::SignalChannel(const ProbeParams& probe, const ProbeEffects& effects, int component,
-                             std::uint64_t seed)
+SignalChannel::SignalChannel(const ProbeParams& probe, int component, Chain<AnaloguePort> effects)
     : period_(probe.signal_period),
       adc_{probe.adc_bits},
       correction_(probe.correction),
-      truth_{kNominalAmplitude, 1 / (1 + effects.sin_gain[component]),
-             kNominalAmplitude * effects.cos_offset[component],
-             kNominalAmplitude * effects.sin_offset[component], effects.phase[component]},
-      noise_(effects.adc_noise / Adc::kGain),
-      jitter_(effects.adc_jitter),
-      seed_(seed),
-      stream_(static_cast<std::uint64_t>(component)) {}
+      effects_(std::move(effects)),
+      component_(component) {}
 
 ChannelSample SignalChannel::sample(double true_deflection) {
-  double x = true_deflection;
-  if (jitter_ > 0 && counter_ > 0) {
-    // One clock triggers all channels: they share the stream.
-    const double late = jitter_ * gaussian_noise(seed_, kAdcJitterStream, counter_)[0];
-    x += (true_deflection - last_deflection_) / kSampleTime * late;
+  SinCos analogue =
+      Lissajous{.amplitude = kNominalAmplitude}.signals(2 * kPi / period_ * true_deflection);
+  if (!effects_.empty()) {
+    AnaloguePort::Signal<double> signal{analogue.u, analogue.w};
+    effects_.step(signal, {{static_cast<double>(samples_) * kSampleTime, kSampleTime, samples_},
+                           component_,
+                           kNominalAmplitude});
+    analogue = {signal.cosine, signal.sine};
   }
-  SinCos analogue = truth_.signals(2 * kPi / period_ * x);
-  if (noise_ > 0) {
-    const auto [a, b] = gaussian_noise(seed_, kAdcNoiseStream + stream_, counter_);
-    analogue.u += noise_ * a;
-    analogue.w += noise_ * b;
-  }
-  last_deflection_ = true_deflection;
-  ++counter_;
+  ++samples_;
 
   ChannelSample result;
   result.cos_code = adc_.code(analogue.u);

@@ -1,10 +1,10 @@
 // From a deflection to converter codes and back: one channel of the probe and its acquisition.
 //
 //   phase      phi = 2 pi x / signal period
-//   signals    u = R1 cos phi + p,  w = R2 sin(phi - alpha) + q,  R1 = 0.5 V (1 Vpp)
+//   signals    u = R cos phi,  w = R sin phi,  R = 0.5 V (1 Vpp), and what effects make of them
 //   front end  V = 1.65 V + 2.5 u
-//   ADC        code = round((V + noise) / q) clamped to 0 .. 2^N - 1,  q = 3.3 V / 2^N, N = 12 or
-//              16; both signals at one instant, which jitters: x is taken at x + x' dt_jitter
+//   ADC        code = round(V / q) clamped to 0 .. 2^N - 1,  q = 3.3 V / 2^N, N = 12 or 16; both
+//              signals at one instant
 //   phase      phi^ = atan2(w', u'), with or without the correction of model/probe/heydemann.hpp
 //   unwrap     sum of the steps d = wrap(phi^_k - phi^_k-1);  x^ = sum * period / 2 pi
 //
@@ -13,12 +13,14 @@
 // differs from the last one by more than pi / 2, a signal amplitude outside 0.6 .. 1.4 of R1, or a
 // free probe that does not read zero (check_zero).
 // Resolution: one code is 1 / 1551 rad or 2.05 nm of 20 um with 12 bits, 0.13 nm with 16 bits.
-// Not modelled: anti-alias filter, integral non-linearity, crosstalk between channels.
+// Not modelled: anti-alias filter, integral non-linearity, noise, jitter and
+// crosstalk come from effects (AnaloguePort, DeflectionPort).
 // Source: 1 Vpp interface of scales and probes; converter data of STM32F4/H7 class parts.
 #pragma once
 
 #include <cstdint>
 
+#include "model/effects/chain.hpp"
 #include "model/machine.hpp"
 #include "model/probe/heydemann.hpp"
 
@@ -61,9 +63,8 @@ struct ChannelSample {
 /// One of the three channels x, y, z. Call sample() every 100 us.
 class SignalChannel {
  public:
-  /// `component` 0, 1, 2; `seed` of the scenario.
-  SignalChannel(const ProbeParams& probe, const ProbeEffects& effects, int component,
-                std::uint64_t seed);
+  /// `component` 0, 1, 2; `effects` are those on the analogue signals.
+  SignalChannel(const ProbeParams& probe, int component, Chain<AnaloguePort> effects = {});
 
   ChannelSample sample(double true_deflection);
 
@@ -80,10 +81,9 @@ class SignalChannel {
   double period_;
   Adc adc_;
   ProbeParams::Correction correction_;
-  Lissajous truth_;  ///< what the sensor really draws
-  double noise_, jitter_;
-  std::uint64_t seed_, stream_, counter_ = 0;
-  double last_deflection_ = 0;
+  Chain<AnaloguePort> effects_;
+  int component_;
+  std::int64_t samples_ = 0;
   OnlineCorrector corrector_;
   Unwrapper unwrapper_;
   bool check_slip_ = false;  ///< a zero check or the amplitude found a slip

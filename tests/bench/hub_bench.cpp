@@ -183,7 +183,7 @@ double machine_nodes() {
     const auto bus = open_transport(uri, id);
     if (id <= static_cast<int>(kAxisCount)) {
       const auto truth = open_truth_writer(truth_path);
-      DriveNode node(static_cast<std::size_t>(id - 1), machine, *truth);
+      DriveNode node(static_cast<std::size_t>(id - 1), machine, 1, *truth);
       run_node(node, *bus);
     } else if (id == kSpindleNode) {
       SpindleNode node(machine);

@@ -26,7 +26,7 @@ TEST(Config, ValuesInTheKeysUnitBecomeSi) {
       "m");
   EXPECT_DOUBLE_EQ(m.axes[kX].limits.velocity, 0.25);
   EXPECT_DOUBLE_EQ(m.axes[kA].limits.max, kPi / 2);
-  EXPECT_DOUBLE_EQ(m.effects.axis[kX].backlash.gap, 10e-6);
+  EXPECT_DOUBLE_EQ(m.effects.axis[kX].get<Backlash>().gap, 10e-6);
 }
 
 TEST(Config, EveryShippedMachineLoadsWithItsPiece) {
@@ -57,14 +57,15 @@ TEST(Config, WritingAndReadingGivesTheSameBits) {
   const Machine again = parse_machine(to_toml(m), "again");
   EXPECT_EQ(to_toml(again), to_toml(m));
   EXPECT_EQ(again.axes[kC].limits.velocity, m.axes[kC].limits.velocity);
-  EXPECT_EQ(again.effects.axis[kA].backlash.gap, m.effects.axis[kA].backlash.gap);
+  EXPECT_EQ(again.effects.axis[kA].get<Backlash>().gap, m.effects.axis[kA].get<Backlash>().gap);
+  EXPECT_DOUBLE_EQ(again.effects.axis[kA].get<Backlash>().gap, 1.7 * kDegree / 3600);
   EXPECT_EQ(again.kinematics.p_MA, m.kinematics.p_MA);
 }
 
 TEST(Config, DeclaredMachineHasNoEffects) {
   const Machine m = declared(load_machine(kMachines + "trunnion_measured.toml"));
-  EXPECT_EQ(m.effects.axis[kX].friction.coulomb, 0);
-  EXPECT_EQ(m.effects.axis[kC].backlash.gap, 0);
+  EXPECT_EQ(m.effects.axis[kX].get<Coulomb>().level, 0);
+  EXPECT_EQ(m.effects.axis[kC].get<Backlash>().gap, 0);
   EXPECT_EQ(m.axes[kX].limits.velocity,
             load_machine(kMachines + "trunnion_measured.toml").axes[kX].limits.velocity);
 }

@@ -149,7 +149,7 @@ TEST(CircularTest, BacklashStepsWhereItsAxisReverses) {
   // Without friction the load would lie at the side its inertia pushes it to, not the one it is
   // dragged to.
   const Circle c = circle(
-      {"axes.X.feedback=motor", "effects.X.backlash.gap_um=10", "effects.X.friction.coulomb_N=100"},
+      {"axes.X.feedback=motor", "effects.X.backlash.gap_um=10", "effects.X.coulomb.level_N=100"},
       2000);
   const auto step = [&](double at) {
     return c.between(at + 1, at + 4) - c.between(at - 4, at - 1);
@@ -178,6 +178,19 @@ TEST(WholeMachine, SeedAndScenarioDecideTheTrace) {
   EXPECT_EQ(hash.size(), 32u);
   EXPECT_EQ(play(machine, program, 7).nc.end.trace_hash, hash);
   EXPECT_NE(play(machine, program, 8).nc.end.trace_hash, hash) << "noise must depend on the seed";
+}
+
+/// The library costs an ideal machine nothing: no bit of any frame changes when every effect is
+/// simulated at its null value.
+TEST(WholeMachine, EffectsAtTheirNullValueDoNotChangeABit) {
+  for (const char* file : {"machines/trunnion.toml", "machines/head.toml"}) {
+    Machine machine = load_machine(configs(file));
+    const std::string program =
+        "G90 G21\nM19\nG43.4 H1\nG64 P0.01\nG1 X10 Y5 A3 C4 F3000\nG2 X20 Y5 I5 J0\nM30\n";
+    const std::string hash = play(machine, program).nc.end.trace_hash;
+    machine.effects.simulate_null = true;
+    EXPECT_EQ(play(machine, program).nc.end.trace_hash, hash) << file;
+  }
 }
 
 // ------------------------------------------------------------------------------ overtravel

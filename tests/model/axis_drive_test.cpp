@@ -22,12 +22,12 @@ AxisParams axis(double kv = 40, double velocity_ff = 0, double acceleration_ff =
   return p;
 }
 
-FrictionParams friction() {
-  FrictionParams p;
-  p.coulomb = 250;
-  p.breakaway = 350;
-  p.viscous = 1000;
-  return p;
+AxisEffects friction() {
+  AxisEffects effects;
+  effects.get<Coulomb>().level = 250;
+  effects.get<Stribeck>().excess = 100;  // breaks away at 350 N
+  effects.get<Viscous>().coefficient = 1000;
+  return effects;
 }
 
 TEST(AxisDrive, RampFollowingError) {
@@ -163,18 +163,16 @@ Reversal reversal(const AxisParams& params, const AxisEffects& effects) {
 }
 
 TEST(AxisDrive, BacklashIsLostMotionWithMotorFeedback) {
-  AxisEffects effects;
-  effects.backlash.gap = 10 * kUm;
-  effects.friction = friction();
+  AxisEffects effects = friction();
+  effects.get<Backlash>().gap = 10 * kUm;
   const Reversal r = reversal(axis(40, 1, 1), effects);
   EXPECT_NEAR(r.lost_motion, 10 * kUm, 0.3 * kUm);  // 250 N on the contact stiffness: 0.1 um a side
   EXPECT_NEAR(r.error_home - r.error_out, 10 * kUm, 0.5 * kUm);
 }
 
 TEST(AxisDrive, BacklashIsGoneAtRestWithLoadFeedback) {
-  AxisEffects effects;
-  effects.backlash.gap = 10 * kUm;
-  effects.friction = friction();
+  AxisEffects effects = friction();
+  effects.get<Backlash>().gap = 10 * kUm;
   AxisParams params = axis(40, 1, 1);
   params.servo.feedback = Feedback::load;
   const Reversal r = reversal(params, effects);
@@ -194,8 +192,8 @@ TEST(AxisDrive, FreeResonanceOfTwoMasses) {
   params.servo.integral_time = 10;
   params.servo.feedback = Feedback::motor;
   AxisEffects effects;
-  effects.windup.compliance = 1 / 1.5e8;
-  effects.windup.damping_ratio = 0;
+  effects.get<Windup>().compliance = 1 / 1.5e8;
+  effects.get<Windup>().damping_ratio = 0;
   AxisDrive drive(params, effects);
   // 1 mm of step: the force jumps and the spring rings.
   std::vector<double> twist;
@@ -220,8 +218,8 @@ TEST(AxisDrive, FreeResonanceOfTwoMasses) {
 // At constant speed against viscous friction the spring carries F = B v and winds up by F / K.
 TEST(AxisDrive, WindupIsForceOverStiffness) {
   AxisEffects effects;
-  effects.windup.compliance = 1 / 1.5e8;
-  effects.friction.viscous = 4000;
+  effects.get<Windup>().compliance = 1 / 1.5e8;
+  effects.get<Viscous>().coefficient = 4000;
   AxisDrive drive(axis(40, 1, 1), effects);
   AxisCycle cycle;
   const double v = 0.1;
@@ -232,8 +230,7 @@ TEST(AxisDrive, WindupIsForceOverStiffness) {
 }
 
 TEST(AxisDrive, ForceCarriesTheFriction) {
-  AxisEffects effects;
-  effects.friction = friction();
+  AxisEffects effects = friction();
   AxisDrive drive(axis(40, 1, 1), effects);
   AxisCycle cycle;
   const double v = 0.05;
@@ -244,9 +241,8 @@ TEST(AxisDrive, ForceCarriesTheFriction) {
 
 // Friction peaks at a reversal: outward after the quadrant, of a plausible size, then it decays.
 TEST(AxisDrive, QuadrantGlitch) {
-  AxisEffects effects;
-  effects.friction = friction();
-  effects.friction.viscous = 0;
+  AxisEffects effects = friction();
+  effects.get<Viscous>().coefficient = 0;
   AxisDrive drive(axis(40, 1, 1), effects);
   const double radius = 0.1, w = 0.05 / radius;
   double peak = 0;
@@ -263,7 +259,7 @@ TEST(AxisDrive, QuadrantGlitch) {
 TEST(AxisDrive, CoarseEncoderStaysQuiet) {
   for (const double quantum : {0.01 * kUm, 0.1 * kUm, 1 * kUm}) {
     AxisEffects effects;
-    effects.encoder.quantum = quantum;
+    effects.get<EncoderQuantisation>().quantum = quantum;
     AxisDrive drive(axis(40, 1, 1), effects);
     double worst = 0, force = 0;
     const double v = 0.033;
@@ -305,8 +301,7 @@ TEST(AxisDrive, QuickStopBrakesWithTheGivenDeceleration) {
 TEST(AxisDrive, HoldsWhereItStands) {
   AxisParams params = axis(40, 1, 1);
   params.limits.start = 0.123;
-  AxisEffects effects;
-  effects.friction = friction();
+  AxisEffects effects = friction();
   AxisDrive drive(params, effects);
   EXPECT_EQ(drive.position(), 0.123);
   for (int k = 0; k < 100; ++k) {
@@ -335,17 +330,16 @@ TEST(AxisDrive, ForceStaysWithinItsLimitAndTheIntegralDoesNotWindUp) {
 }
 
 TEST(AxisDrive, DefaultLoopsAreStableWithEveryMechanicalEffect) {
-  const Machine machine;
   for (std::size_t i = 0; i < kAxisCount; ++i)
     for (const Feedback feedback : {Feedback::motor, Feedback::load}) {
-      AxisParams params = machine.axes[i];
-      params.servo.feedback = feedback;
-      AxisEffects effects = machine.effects.axis[i];
-      effects.friction.coulomb = is_rotary(i) ? 4 : 250;
-      effects.friction.breakaway = is_rotary(i) ? 6 : 350;
-      effects.windup.compliance = is_rotary(i) ? 5e-7 : 1 / 1.5e8;
-      effects.backlash.gap = is_rotary(i) ? 2e-5 : 5 * kUm;
-      AxisDrive drive(params, effects);
+      Machine machine;
+      machine.axes[i].servo.feedback = feedback;
+      AxisEffects& effects = machine.effects.axis[i];
+      effects.get<Coulomb>().level = is_rotary(i) ? 4 : 250;
+      effects.get<Stribeck>().excess = is_rotary(i) ? 2 : 100;
+      effects.get<Windup>().compliance = is_rotary(i) ? 5e-7 : 1 / 1.5e8;
+      effects.get<Backlash>().gap = is_rotary(i) ? 2e-5 : 5 * kUm;
+      AxisDrive drive(machine, i, 1);
       const double amplitude = is_rotary(i) ? 0.3 : 0.05;
       for (int k = 1; k <= 4000; ++k) {
         const double phi = 2 * kPi * 0.5 * kCycle * k;
@@ -361,16 +355,15 @@ TEST(AxisDrive, BacklashWithoutAMotorSideIsRefused) {
   AxisParams params;
   params.mechanics.motor_inertia = 0;
   AxisEffects effects;
-  effects.backlash.gap = 1e-6;
+  effects.get<Backlash>().gap = 1e-6;
   EXPECT_THROW(AxisDrive(params, effects), std::invalid_argument);
   EXPECT_NO_THROW(AxisDrive(params, {}));
 }
 
 TEST(AxisDrive, SameInputsSameBits) {
-  AxisEffects effects;
-  effects.friction = friction();
-  effects.backlash.gap = 5 * kUm;
-  effects.encoder.quantum = 0.1 * kUm;
+  AxisEffects effects = friction();
+  effects.get<Backlash>().gap = 5 * kUm;
+  effects.get<EncoderQuantisation>().quantum = 0.1 * kUm;
   AxisDrive a(axis(), effects), b(axis(), effects);
   for (int k = 1; k <= 500; ++k) {
     const AxisSetpoint target{1e-5 * k * k, 2e-2 * k};

@@ -28,6 +28,9 @@ PieceParams ring() {
   return p;
 }
 
+/// The ball with effects on it and its contact.
+Chain<TouchPort> touch(const Effects& effects) { return machine_chain<TouchPort>(effects, 1); }
+
 ToolPose at(const Vec3& p, const Mat3& R = Mat3::Identity()) { return {p, R}; }
 
 TEST(UsableRange, FormulaAndTable) {
@@ -169,9 +172,9 @@ TEST(ProbeContact, ScansTheWholeS) {
 // Steady sliding: the ball drags behind by mu F_n / k, across the normal only.
 TEST(ProbeContact, SurfaceFrictionDragsAlongTheSurface) {
   const auto piece = make_piece(wall(Vec3::UnitX()));
-  ProbeEffects effects;
-  effects.surface_friction = 0.15;
-  ProbeContact contact({}, effects, piece.get());
+  Effects effects;
+  effects.get<SurfaceFriction>().coefficient = 0.15;
+  ProbeContact contact({}, touch(effects), piece.get());
   Vec3 delta;
   for (int i = 0; i < 20000; ++i) delta = contact.step(at({2.5e-3, 0.03 * kStep * i, 0}));
   EXPECT_NEAR(delta.x(), 0.5e-3, 1e-12);
@@ -182,9 +185,9 @@ TEST(ProbeContact, SurfaceFrictionDragsAlongTheSurface) {
 
 TEST(ProbeContact, SticksUntilTheSpringBreaksItLoose) {
   const auto piece = make_piece(wall(Vec3::UnitX()));
-  ProbeEffects effects;
-  effects.surface_friction = 0.5;
-  ProbeContact contact({}, effects, piece.get());
+  Effects effects;
+  effects.get<SurfaceFriction>().coefficient = 0.5;
+  ProbeContact contact({}, touch(effects), piece.get());
   for (int i = 0; i < 1000; ++i) contact.step(at({2.5e-3, 0, 0}));
   for (int i = 0; i < 2000; ++i) {  // 0.2 mm slowly: below mu * 0.5 mm
     contact.step(at({2.5e-3, 1e-7 * i, 0}));
@@ -246,9 +249,9 @@ TEST(ProbeContact, SnapBackIsBoundedByTheStoredEnergy) {
 
 TEST(ProbeContact, SuspensionReturnsToZeroWithinItsHysteresis) {
   const auto piece = make_piece(wall(Vec3::UnitX()));
-  ProbeEffects effects;
-  effects.return_to_zero = 2e-6;
-  ProbeContact contact({}, effects, piece.get());
+  Effects effects;
+  effects.get<ReturnToZero>().half_width = 2e-6;
+  ProbeContact contact({}, touch(effects), piece.get());
   for (int i = 0; i < 2000; ++i) contact.step(at({2.5e-3, 0, 0}));
   EXPECT_NEAR(contact.step(at({2.5e-3, 0, 0})).x(), 0.5e-3,
               1e-12);  // the surface decides in contact

@@ -2,33 +2,63 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+
+#include "model/effects/chain.hpp"
 
 namespace vcnc {
 namespace {
 
 constexpr double kDt = 50e-6, kMass = 500;
 
-FrictionParams stribeck() {
-  FrictionParams p;
-  p.coulomb = 250;
-  p.breakaway = 350;
-  p.stribeck_velocity = 2e-3;
-  p.viscous = 1000;
-  return p;
+struct Guide {
+  Coulomb coulomb;
+  Stribeck stribeck;
+  Viscous viscous;
+  Presliding presliding;
+};
+
+/// Friction with the terms that the effects of an axis give.
+class Rubbing {
+ public:
+  explicit Rubbing(const Guide& guide) {
+    Effects effects;
+    effects.axis[kX].get<Coulomb>() = guide.coulomb;
+    effects.axis[kX].get<Stribeck>() = guide.stribeck;
+    effects.axis[kX].get<Viscous>() = guide.viscous;
+    effects.axis[kX].get<Presliding>() = guide.presliding;
+    chain_ = axis_chain<FrictionPort>(effects, kX, 1);
+  }
+  double step(double v, double v_free, double dt, double inertia) {
+    FrictionTerms terms;
+    chain_.step(terms, {{}, 0, v, v_free});
+    return friction_.step(terms, v, v_free, dt, inertia);
+  }
+  double force() const { return friction_.force(); }
+
+ private:
+  Chain<FrictionPort> chain_;
+  Friction friction_;
+};
+
+Guide stribeck() {
+  return {.coulomb = {250},
+          .stribeck = {.excess = 100, .velocity = 2e-3},
+          .viscous = {1000},
+          .presliding = {}};
 }
 
-FrictionParams lugre() {
-  FrictionParams p = stribeck();
-  p.presliding_stiffness = 2.5e7;
-  p.presliding_damping = 1.5e4;
-  return p;
+Guide lugre() {
+  Guide guide = stribeck();
+  guide.presliding = {.stiffness = 2.5e7, .damping = 1.5e4};
+  return guide;
 }
 
 // Force needed to hold a velocity, found by holding it.
-double force_at(const FrictionParams& params, double v) {
-  Friction friction(params);
+double force_at(const Guide& guide, double v) {
+  Rubbing friction(guide);
   double force = 0;
   for (int i = 0; i < 200000; ++i) {
     // The drive force that keeps v: answer the friction of the last step.
@@ -56,7 +86,7 @@ TEST(Friction, LuGreLawAtConstantSpeed) {
 
 TEST(Friction, SticksBelowBreakawayAndOnlyThere) {
   for (const double force : {349.0, -349.0, 351.0, -351.0}) {
-    Friction friction(stribeck());
+    Rubbing friction(stribeck());
     double v = 0;
     for (int i = 0; i < 1000; ++i) v = friction.step(v, v + kDt * force / kMass, kDt, kMass);
     if (std::abs(force) < 350) {
@@ -69,7 +99,7 @@ TEST(Friction, SticksBelowBreakawayAndOnlyThere) {
 }
 
 TEST(Friction, ComesToRestExactly) {
-  Friction friction(stribeck());
+  Rubbing friction(stribeck());
   double v = 0.01;
   int steps = 0;
   while (v != 0 && steps < 100000) {
@@ -86,16 +116,16 @@ TEST(Friction, ComesToRestExactly) {
 
 // Viscous friction alone: v = v0 exp(-B t / m).
 TEST(Friction, ViscousDecay) {
-  FrictionParams params;
-  params.viscous = 1e4;
-  Friction friction(params);
+  Guide guide;
+  guide.viscous.coefficient = 1e4;
+  Rubbing friction(guide);
   double v = 0.1;
   for (int i = 0; i < 1000; ++i) v = friction.step(v, v, kDt, kMass);
   EXPECT_NEAR(v, 0.1 * std::exp(-1.0), 1e-4);
 }
 
 TEST(Friction, LuGrePreslidingIsASpring) {
-  Friction friction(lugre());
+  Rubbing friction(lugre());
   double x = 0, v = 0;
   // A slow push to 50 N, far below Fc: the bristles bend by F / sigma0 = 2 um.
   for (int i = 0; i < 40000; ++i) {
@@ -104,7 +134,7 @@ TEST(Friction, LuGrePreslidingIsASpring) {
     x += kDt * v;
   }
   EXPECT_NEAR(x, 2e-6, 0.3e-6);  // the curve bends: 50 N is a seventh of Fs
-  Friction soft(lugre());
+  Rubbing soft(lugre());
   double x_small = 0;
   v = 0;
   for (int i = 0; i < 40000; ++i) {
@@ -119,12 +149,12 @@ TEST(Friction, NeverAddsKineticEnergyNorReverses) {
   std::mt19937_64 engine(5);
   const auto uniform = [&] { return static_cast<double>(engine() >> 11) * 0x1p-53; };
   for (int k = 0; k < 300; ++k) {
-    FrictionParams params;
-    params.coulomb = 1000 * uniform();
-    params.breakaway = 2000 * uniform();
-    params.viscous = 1e4 * uniform();
-    params.stribeck_velocity = 1e-4 + 0.01 * uniform();
-    Friction friction(params);
+    Guide guide;
+    guide.coulomb.level = 1000 * uniform();
+    guide.stribeck.excess = std::max(2000 * uniform() - guide.coulomb.level, 0.0);
+    guide.viscous.coefficient = 1e4 * uniform();
+    guide.stribeck.velocity = 1e-4 + 0.01 * uniform();
+    Rubbing friction(guide);
     const double mass = 1 + 1000 * uniform();
     double v = 0.2 * uniform() - 0.1;
     for (int i = 0; i < 300; ++i) {
@@ -142,7 +172,7 @@ TEST(Friction, NeverAddsKineticEnergyNorReverses) {
 // store.
 TEST(Friction, LuGreDissipatesOverCycles) {
   for (const double amplitude : {2e-6, 20e-6, 2e-3}) {
-    Friction friction(lugre());
+    Rubbing friction(lugre());
     double work = 0, lowest = 0;
     double v = 0;
     for (int i = 0; i < 40000; ++i) {
@@ -159,10 +189,9 @@ TEST(Friction, LuGreDissipatesOverCycles) {
 
 TEST(Friction, StableForAnyStiffness) {
   for (const double stiffness : {1e6, 1e9, 1e12, 1e15}) {
-    FrictionParams params = lugre();
-    params.presliding_stiffness = stiffness;
-    params.presliding_damping = 1e8;
-    Friction friction(params);
+    Guide guide = lugre();
+    guide.presliding = {.stiffness = stiffness, .damping = 1e8};
+    Rubbing friction(guide);
     double v = 0;
     for (int i = 0; i < 20000; ++i) {
       const double force = 600 * std::sin(2 * kPi * 3 * i * kDt);
@@ -173,7 +202,7 @@ TEST(Friction, StableForAnyStiffness) {
 }
 
 TEST(Friction, NullIsIdentity) {
-  Friction friction(FrictionParams{});
+  Rubbing friction(Guide{});
   for (const double v : {-0.3, 0.0, 1e-9, 0.2}) EXPECT_EQ(friction.step(0.1, v, kDt, kMass), v);
 }
 

@@ -44,11 +44,11 @@ TEST(NoAllocation, TheGuardSeesAllocations) {
 
 TEST(NoAllocation, Drives) {
   AxisEffects effects;
-  effects.friction.coulomb = 250;
-  effects.friction.presliding_stiffness = 2.5e7;
-  effects.backlash.gap = 5e-6;
-  effects.windup.compliance = 1e-8;
-  effects.encoder.quantum = 1e-7;
+  effects.get<Coulomb>().level = 250;
+  effects.get<Presliding>().stiffness = 2.5e7;
+  effects.get<Backlash>().gap = 5e-6;
+  effects.get<Windup>().compliance = 1e-8;
+  effects.get<EncoderQuantisation>().quantum = 1e-7;
   AxisDrive drive({}, effects);
   EXPECT_EQ(allocations_in([&](int i) { drive.follow({1e-5 * i, 1e-2}); }), 0u);
   EXPECT_EQ(allocations_in([&](int) { drive.brake(1); }), 0u);
@@ -59,25 +59,29 @@ TEST(NoAllocation, Drives) {
 TEST(NoAllocation, ProbeOnThePiece) {
   const auto piece = make_piece(s_eq1());
   const auto path = piece->scan_path(3e-3, 0.5e-3, 20e-3, 0.5e-3);
-  ProbeEffects effects;
-  effects.surface_friction = 0.1;
-  effects.return_to_zero = 1e-6;
-  effects.adc_noise = 1e-3;
-  effects.adc_jitter = 1e-6;
+  Effects effects;
+  effects.get<SurfaceFriction>().coefficient = 0.1;
+  effects.get<ReturnToZero>().half_width = 1e-6;
+  effects.get<AdcNoise>().noise = 1e-3;
+  effects.get<SampleJitter>().jitter = 1e-6;
   ProbeParams probe;
   probe.correction = ProbeParams::Correction::heydemann;
-  ProbeContact contact(probe, effects, piece.get());
-  SignalChannel channel(probe, effects, 0, 1);
+  ProbeContact contact(probe, machine_chain<TouchPort>(effects, 1), piece.get());
+  Chain<DeflectionPort> feeling = machine_chain<DeflectionPort>(effects, 1);
+  SignalChannel channel(probe, 0, machine_chain<AnaloguePort>(effects, 1));
   const Kinematics kinematics({}, 0.15, Vec3::Zero());
   EXPECT_EQ(allocations_in([&](int i) {
               const Vec3 p =
                   path[0].centre + 8e-3 * i * (path[1].centre - path[0].centre);  // 40 mm/s
               const AxisVector q = kinematics.inverse(p, 0.1, 1e-3 * i);
-              channel.sample(contact.step(kinematics.forward(q)).x());
+              DeflectionPort::Signal<double> felt{contact.step(kinematics.forward(q))};
+              feeling.step(felt, {{1e-4 * i, 1e-4, i}, probe.spring_rate});
+              channel.sample(felt.deflection.x());
               piece->nearest(p, {});  // cold start
             }),
             0u);
   EXPECT_TRUE(contact.touching());
+  EXPECT_FALSE(feeling.empty());
 }
 
 }  // namespace

@@ -16,6 +16,12 @@ ProbeParams probe(int bits = 16) {
   return p;
 }
 
+/// One channel with effects on its signals.
+SignalChannel channel_with(const ProbeParams& p, const Effects& effects, int component,
+                           std::uint64_t seed) {
+  return SignalChannel(p, component, machine_chain<AnaloguePort>(effects, seed));
+}
+
 // Worst error over a slow sweep of 0.2 mm.
 double sweep_error(SignalChannel channel, double from = 0) {
   double worst = 0;
@@ -46,8 +52,8 @@ TEST(Adc, CodesOfKnownVoltages) {
 // Half a step on both signals moves the phase by at most sqrt(2)/2 step over the amplitude in
 // steps.
 TEST(SignalChannel, ResolutionOfTheConverters) {
-  const double sixteen = sweep_error(SignalChannel(probe(16), {}, 0, 1));
-  const double twelve = sweep_error(SignalChannel(probe(12), {}, 0, 1));
+  const double sixteen = sweep_error(SignalChannel(probe(16), 0));
+  const double twelve = sweep_error(SignalChannel(probe(12), 0));
   EXPECT_LT(sixteen, 0.5 * std::sqrt(2) * kPeriod / (2 * kPi) / 24824 * 1.01);
   EXPECT_GT(sixteen, 0.05 * kNm);
   EXPECT_LT(twelve, 0.5 * std::sqrt(2) * kPeriod / (2 * kPi) / 1551 * 1.01);
@@ -55,31 +61,31 @@ TEST(SignalChannel, ResolutionOfTheConverters) {
 }
 
 TEST(SignalChannel, ErrorsOfTheSignals) {
-  ProbeEffects effects;
-  effects.cos_offset = Vec3(0.01, 0, 0);
-  effects.sin_gain = Vec3(0, 0.02, 0);
-  effects.phase = Vec3(0, 0, 0.02);
-  EXPECT_NEAR(sweep_error(SignalChannel(probe(), effects, 0, 1)), 32 * kNm, 1 * kNm);
-  EXPECT_NEAR(sweep_error(SignalChannel(probe(), effects, 1, 1)), 32 * kNm, 1 * kNm);
-  EXPECT_NEAR(sweep_error(SignalChannel(probe(), effects, 2, 1)), 64 * kNm, 1 * kNm);
+  Effects effects;
+  effects.get<SignalOffset>().cosine = Vec3(0.01, 0, 0);
+  effects.get<SignalGain>().gain = Vec3(0, 0.02, 0);
+  effects.get<SignalPhase>().angle = Vec3(0, 0, 0.02);
+  EXPECT_NEAR(sweep_error(channel_with(probe(), effects, 0, 1)), 32 * kNm, 1 * kNm);
+  EXPECT_NEAR(sweep_error(channel_with(probe(), effects, 1, 1)), 32 * kNm, 1 * kNm);
+  EXPECT_NEAR(sweep_error(channel_with(probe(), effects, 2, 1)), 64 * kNm, 1 * kNm);
 }
 
 TEST(SignalChannel, HeydemannRemovesThem) {
-  ProbeEffects effects;
-  effects.cos_offset = Vec3::Constant(0.03);
-  effects.sin_offset = Vec3::Constant(-0.04);
-  effects.sin_gain = Vec3::Constant(-0.08);
-  effects.phase = Vec3::Constant(4 * kDegree);
+  Effects effects;
+  effects.get<SignalOffset>().cosine = Vec3::Constant(0.03);
+  effects.get<SignalOffset>().sine = Vec3::Constant(-0.04);
+  effects.get<SignalGain>().gain = Vec3::Constant(-0.08);
+  effects.get<SignalPhase>().angle = Vec3::Constant(4 * kDegree);
   ProbeParams p = probe();
-  EXPECT_GT(sweep_error(SignalChannel(p, effects, 0, 1)), 200 * kNm);
+  EXPECT_GT(sweep_error(channel_with(p, effects, 0, 1)), 200 * kNm);
   p.correction = ProbeParams::Correction::heydemann;
-  EXPECT_LT(sweep_error(SignalChannel(p, effects, 0, 1), 25e-6), 0.5 * kNm);
+  EXPECT_LT(sweep_error(channel_with(p, effects, 0, 1), 25e-6), 0.5 * kNm);
 }
 
 TEST(SignalChannel, NoiseAveragesToItsPrediction) {
-  ProbeEffects effects;
-  effects.adc_noise = 2e-3;  // at the converter; 1.25 V amplitude
-  SignalChannel channel(probe(), effects, 0, 5);
+  Effects effects;
+  effects.get<AdcNoise>().noise = 2e-3;  // at the converter; 1.25 V amplitude
+  SignalChannel channel = channel_with(probe(), effects, 0, 5);
   double sum = 0, sum2 = 0;
   constexpr int kCount = 20000;
   for (int i = 0; i < kCount; ++i) {
@@ -92,10 +98,30 @@ TEST(SignalChannel, NoiseAveragesToItsPrediction) {
   EXPECT_NEAR(std::sqrt(sum2 / kCount), expected, 0.03 * expected);
 }
 
+// The jitter acts on the deflection before the converters (DeflectionPort).
+class JitteringChannel {
+ public:
+  explicit JitteringChannel(const Effects& effects)
+      : sampling_(machine_chain<DeflectionPort>(effects, 5)),
+        channel_(channel_with(probe(), effects, 0, 5)) {}
+
+  ChannelSample sample(double true_deflection) {
+    DeflectionPort::Signal<double> signal{Vec3(true_deflection, 0, 0)};
+    sampling_.step(signal, {{static_cast<double>(count_) * kStep, kStep, count_}, 1324});
+    ++count_;
+    return channel_.sample(signal.deflection.x());
+  }
+
+ private:
+  Chain<DeflectionPort> sampling_;
+  SignalChannel channel_;
+  std::int64_t count_ = 0;
+};
+
 TEST(SignalChannel, JitterCostsSpeedTimesTime) {
-  ProbeEffects effects;
-  effects.adc_jitter = 2e-6;
-  SignalChannel channel(probe(), effects, 0, 5);
+  Effects effects;
+  effects.get<SampleJitter>().jitter = 2e-6;
+  JitteringChannel channel(effects);
   double sum2 = 0;
   constexpr int kCount = 10000;
   const double v = 0.02;
@@ -105,14 +131,15 @@ TEST(SignalChannel, JitterCostsSpeedTimesTime) {
     sum2 += e * e;
   }
   EXPECT_NEAR(std::sqrt(sum2 / kCount), v * 2e-6, 0.03 * v * 2e-6);
-  SignalChannel at_rest(probe(), effects, 0, 5);
+  JitteringChannel at_rest(effects);
   for (int i = 0; i < 100; ++i) EXPECT_LT(std::abs(at_rest.sample(0).deflection), 0.1 * kNm);
 }
 
 TEST(SignalChannel, ChannelsHaveNoiseOfTheirOwnButOneClock) {
-  ProbeEffects effects;
-  effects.adc_noise = 2e-3;
-  SignalChannel x(probe(), effects, 0, 5), y(probe(), effects, 1, 5), again(probe(), effects, 0, 5);
+  Effects effects;
+  effects.get<AdcNoise>().noise = 2e-3;
+  SignalChannel x = channel_with(probe(), effects, 0, 5), y = channel_with(probe(), effects, 1, 5),
+                again = channel_with(probe(), effects, 0, 5);
   int same = 0;
   for (int i = 0; i < 100; ++i) {
     const double a = x.sample(0).deflection;
@@ -128,7 +155,7 @@ struct Way {
   bool slip;
 };
 Way travel(double speed) {
-  SignalChannel channel(probe(), {}, 0, 1);
+  SignalChannel channel(probe(), 0);
   double x = 0, v = 0;
   ChannelSample s;
   for (int i = 0; i < 5000; ++i) {
@@ -154,7 +181,7 @@ TEST(SignalChannel, CountsUpToTheLimitAndFlagsASlipBeyond) {
 }
 
 TEST(SignalChannel, AJumpOfAThirdOfAPeriodIsFlagged) {
-  SignalChannel channel(probe(), {}, 0, 1);
+  SignalChannel channel(probe(), 0);
   for (int i = 0; i < 10; ++i) EXPECT_FALSE(channel.sample(0).slip);
   EXPECT_TRUE(channel.sample(7e-6).slip);
   EXPECT_TRUE(channel.sample(7e-6).slip);  // and stays flagged
@@ -163,7 +190,7 @@ TEST(SignalChannel, AJumpOfAThirdOfAPeriodIsFlagged) {
 }
 
 TEST(SignalChannel, ZeroCheckFindsAWholePeriod) {
-  SignalChannel channel(probe(), {}, 0, 1);
+  SignalChannel channel(probe(), 0);
   channel.sample(0);
   EXPECT_EQ(channel.check_zero(), 0);
   for (int i = 0; i <= 400; ++i) channel.sample(1e-7 * i);
@@ -173,9 +200,9 @@ TEST(SignalChannel, ZeroCheckFindsAWholePeriod) {
 }
 
 TEST(SignalChannel, BadAmplitudeIsAFault) {
-  ProbeEffects effects;
-  effects.cos_offset = Vec3::Constant(0.5);
-  SignalChannel channel(probe(), effects, 0, 1);
+  Effects effects;
+  effects.get<SignalOffset>().cosine = Vec3::Constant(0.5);
+  SignalChannel channel = channel_with(probe(), effects, 0, 1);
   bool fault = false, fine = false;
   for (int i = 0; i < 200; ++i) {
     const ChannelSample s = channel.sample(1e-7 * i);

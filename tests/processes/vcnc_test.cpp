@@ -276,6 +276,13 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"UnknownKey", "{GOOD} --set axes.X.speed=3", 2, "axes.X.speed: unknown key"},
         BadInput{"WrongUnit", "{S}short.ngc --machine {S}bad.toml --out {S}out", 2,
                  "bad.toml:3: axes.X.velocity_m_s: unknown key; did you mean velocity_mm_s?"},
+        BadInput{"UnknownEffect", "{GOOD} --inject X.backlsh.gap_um=3", 2,
+                 "--inject X.backlsh.gap_um=3: effects.X.backlsh: unknown key; did you mean "
+                 "backlash?"},
+        BadInput{"EffectOutOfRange", "{GOOD} --inject X.backlash.gap_um=3000", 2,
+                 "allowed 0 .. 2000 um"},
+        BadInput{"BadDeviation", "{GOOD} --inject axes.Y.load_kg=-1", 2,
+                 "axes.Y.load_kg: -1 is out of range"},
         BadInput{"OutOfRange", "{GOOD} --set axes.X.kv_per_s=-4", 2, "allowed 0.1 .. 1000 per_s"},
         BadInput{"NoMachine", "{S}short.ngc --machine {S}none.toml --out {S}out", 2,
                  "none.toml: cannot be opened"},
@@ -307,6 +314,47 @@ TEST_F(Vcnc, EveryProgramExplainsItself) {
     EXPECT_GT(help.out.size(), 100u) << program;
     EXPECT_EQ(shell(scratch_, bin(program) + " --nonsense").code, 2) << program;
   }
+}
+
+TEST_F(Vcnc, EffectsAreListedShownAndExported) {
+  const auto effects = [&](const std::string& options) {
+    return shell(scratch_, bin("vcnc") + " effects " + options);
+  };
+  const Said table = effects("");
+  EXPECT_EQ(table.code, 0);
+  EXPECT_NE(table.out.find("  backlash "), std::string::npos);
+  const Said page = effects("show backlash");
+  EXPECT_EQ(page.code, 0);
+  EXPECT_NE(page.out.find("--inject X.backlash.gap_um=10\n"), std::string::npos) << page.out;
+  const Said json = effects("--json");
+  EXPECT_EQ(json.code, 0);
+  EXPECT_EQ(json.out.substr(0, 11), "{\"effects\":");
+  EXPECT_EQ(effects("--markdown").out,
+            read_text(std::string(VCNC_SOURCE_DIR) + "/docs/effects.md"));
+  const Said unknown = effects("show backlas");
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_EQ(unknown.out, "");
+  EXPECT_EQ(unknown.err,
+            "vcnc: vcnc effects show backlas: no such effect; did you mean backlash?\n");
+  EXPECT_EQ(effects("show").code, 2);
+  EXPECT_EQ(effects("--json --markdown").code, 2);
+}
+
+/// What is injected is in the machine as run, changes the run, and is no secret to its folder.
+TEST_F(Vcnc, InjectionsAreInTheRunInEveryLayout) {
+  ASSERT_EQ(run("plain", "--in-process").code, 0);
+  const std::string options =
+      "--inject Y.backlash.gap_um=12 --inject axes.X.load_kg=550 "
+      "--inject 'probe.signal_offset.cosine_percent=[1, 2, 3]'";
+  ASSERT_EQ(run("a", "--in-process " + options).code, 0);
+  ASSERT_EQ(run("b", options).code, 0);
+  EXPECT_EQ(hash("a"), hash("b"));
+  EXPECT_NE(hash("a"), hash("plain"));
+  const std::string machine = read_text(scratch_ / "a/machine.toml");
+  EXPECT_NE(machine.find("[effects.Y.backlash]\ngap_um = 12.0\n"), std::string::npos);
+  EXPECT_NE(machine.find("[[effects.deviation]]\nkey = \"axes.X.load_kg\"\nvalue = 550.0\n"),
+            std::string::npos);
+  EXPECT_NE(machine.find("\nload_kg = 500.0\n"), std::string::npos);
 }
 
 TEST_F(Vcnc, ProgramsOfEveryKindRunOnBothKinematics) {

@@ -10,7 +10,7 @@ namespace {
 /// One drive X alone on a bus that the test plays by hand.
 class DriveNodeTest : public testing::Test {
  protected:
-  DriveNodeTest() : truth_(open_local_truth()), node_(kX, machine_, *truth_) {}
+  DriveNodeTest() : truth_(open_local_truth()), node_(kX, machine_, 1, *truth_) {}
 
   DriveStatus cycle(std::uint16_t controlword, double position = 0, bool tripped = false,
                     bool command = true) {

@@ -1,0 +1,79 @@
+#include "model/parameters.hpp"
+
+#include <cmath>
+#include <initializer_list>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+namespace vcnc {
+namespace {
+
+/// A visitor of fields() that keeps every number.
+class Collector {
+ public:
+  explicit Collector(std::vector<Parameter>& all) : all_(all) {}
+
+  void operator()(std::string_view key, double& v, Unit u, Range r, const char*) {
+    all_.push_back({path_ + std::string(key), &v, u, r});
+  }
+  void operator()(std::string_view key, Vec3& v, Unit u, Range r, const char*) {
+    for (Eigen::Index i = 0; i < 3; ++i)
+      all_.push_back({path_ + std::string(key) + "." + "xyz"[i], &v[i], u, r});
+  }
+  void operator()(std::string_view, std::vector<double>&, Unit, Range, const char*) {}
+  void operator()(std::string_view, std::vector<Vec3>&, Unit, Range, const char*) {}
+  void operator()(std::string_view, int&, Range, const char*) {}
+  void operator()(std::string_view, bool&, const char*) {}
+  void operator()(std::string_view, std::string&, const char*) {}
+  template <class Enum>
+  void choice(std::string_view, Enum&, std::initializer_list<std::pair<const char*, Enum>>,
+              const char*) {}
+  template <class T>
+  void list(std::string_view, std::vector<T>&, const char*) {}
+  template <class T, class... Args>
+  void group(std::string_view key, T& v, const char* doc, Args... args) {
+    section(key, doc, [&](Collector& inner) { T::fields(v, inner, args...); });
+  }
+  template <class T, class... Args>
+  void effect(std::string_view key, T& v, const char* doc, Args... args) {
+    group(key, v, doc, args...);
+  }
+  template <class F>
+  void section(std::string_view key, const char*, F&& f) {
+    const std::string outer = path_;
+    path_ += std::string(key) + ".";
+    f(*this);
+    path_ = outer;
+  }
+
+ private:
+  std::vector<Parameter>& all_;
+  std::string path_;
+};
+
+}  // namespace
+
+std::vector<Parameter> parameters(Machine& machine) {
+  std::vector<Parameter> all;
+  Collector collector(all);
+  Machine::fields(machine, collector);
+  return all;
+}
+
+void set_parameter(Machine& machine, const std::string& key, double value) {
+  for (const Parameter& p : parameters(machine)) {
+    if (p.key != key) continue;
+    if (!(std::isfinite(value) && value >= p.range.min && value <= p.range.max)) {
+      std::ostringstream text;
+      text << key << ": " << value << " is out of range, allowed " << p.range.min << " .. "
+           << p.range.max << (p.unit.suffix.empty() ? "" : " ") << p.unit.suffix;
+      throw std::invalid_argument(text.str());
+    }
+    *p.value = value * p.unit.to_si;
+    return;
+  }
+  throw std::invalid_argument(key + ": is not a number of a machine file");
+}
+
+}  // namespace vcnc

@@ -1,0 +1,30 @@
+// Every number of a machine by name: for perturbing it, for tables, for fits.
+//
+// The names are the keys of a machine file with dots between tables ("axes.Y.load_kg",
+// "effects.X.backlash.gap_um"); components of a vector are named .x, .y, .z.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "model/machine.hpp"
+
+namespace vcnc {
+
+struct Parameter {
+  std::string key;
+  double* value;  ///< SI, in the machine it was taken from
+  Unit unit;      ///< of the key
+  Range range;    ///< in the unit of the key
+
+  double in_unit() const { return *value / unit.to_si; }
+};
+
+/// The numbers of `machine`, which must outlive the result and not be moved.
+std::vector<Parameter> parameters(Machine& machine);
+
+/// Sets one number, given in the unit of its key. Throws std::invalid_argument for an unknown key
+/// or a value out of range, with what is allowed.
+void set_parameter(Machine& machine, const std::string& key, double value);
+
+}  // namespace vcnc
