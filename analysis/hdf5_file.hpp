@@ -109,10 +109,13 @@ inline bool write(hid_t object, const char* name, const std::vector<std::string>
                          texts.data());
 }
 
+/// Reads an attribute of one element; one of more would not fit into `value`.
 inline bool read_attribute(hid_t object, const char* name, hid_t type, void* value) {
   if (H5Aexists(object, name) <= 0) return false;
   const Handle a(H5Aopen(object, name, H5P_DEFAULT));
-  return a.ok() && H5Aread(a, type, value) >= 0;
+  if (!a.ok()) return false;
+  const Handle space(H5Aget_space(a));
+  return space.ok() && H5Sget_simple_extent_npoints(space) == 1 && H5Aread(a, type, value) >= 0;
 }
 inline bool read(hid_t object, const char* name, std::string& value) {
   char* text = nullptr;
@@ -153,22 +156,23 @@ inline bool append(hid_t table, hid_t type, int rank, hsize_t width, hsize_t at,
          H5Dwrite(table, type, memory, space, H5P_DEFAULT, data) >= 0;
 }
 
-inline hsize_t row_count(hid_t table, hsize_t* width) {
+/// Rows and columns of a table of this rank (1: no columns); nothing of any other.
+inline std::array<hsize_t, 2> size_of(hid_t table, int rank) {
   std::array<hsize_t, 2> size{0, 0};
   const Handle space(H5Dget_space(table));
-  if (H5Sget_simple_extent_ndims(space) > 2) return 0;
-  H5Sget_simple_extent_dims(space, size.data(), nullptr);
-  if (width != nullptr) *width = size[1];
-  return size[0];
+  if (!space.ok() || H5Sget_simple_extent_ndims(space) != rank ||
+      H5Sget_simple_extent_dims(space, size.data(), nullptr) < 0)
+    return {0, 0};
+  return size;
 }
 
 // ------------------------------------------------------------------ alarms
 /// An alarm as it lies in the table.
 struct AlarmRow {
-  std::int64_t tick;
-  std::int64_t code;
-  const char* source;
-  const char* text;
+  std::int64_t tick = 0;
+  std::int64_t code = 0;
+  const char* source = nullptr;
+  const char* text = nullptr;
 };
 
 inline Handle alarm_type() {

@@ -11,6 +11,12 @@
 // collected and written 1000 at a time, each block followed by a flush, so that the file can be
 // read after the writing process was killed, up to the last block. Memory use does not grow with
 // the run.
+//
+// A file that was closed properly carries a seal behind its last HDF5 byte (analysis/seal.hpp),
+// which HDF5 and its tools do not look at: a sealed file whose bytes have changed is refused,
+// because neither its numbers nor the HDF5 library's behaviour on it can be relied on. A file
+// without a seal (interrupted, cut off, or rewritten by another tool) is first read once in a child
+// process: HDF5 may crash on damaged files, and then only the child does.
 #pragma once
 
 #include <filesystem>
@@ -68,6 +74,9 @@ class RecordingReader {
 
  private:
   struct File;
+  void open();
+  void try_in_child();
+
   std::filesystem::path path_;
   std::unique_ptr<File> file_;
   RunBegin begin_;

@@ -1,9 +1,17 @@
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <bit>
 #include <charconv>
 #include <optional>
+#include <string_view>
 
 #include "analysis/hdf5_file.hpp"
 #include "analysis/recording.hpp"
+#include "analysis/seal.hpp"
 #include "analysis/whole_file.hpp"
 
 namespace vcnc {
@@ -27,11 +35,27 @@ std::filesystem::path find_recording(std::filesystem::path path) {
   throw RecordingError(given.string() + ": no such file or folder");
 }
 
-std::vector<Alarm> read_alarms(hid_t file) {
+constexpr const char* kDamaged = "the recording is damaged and cannot be opened";
+
+/// The most rows that a file of this size can hold, should somebody have compressed it. What a
+/// damaged file claims beyond that would be made up by HDF5, and without end.
+hsize_t most_rows(const std::filesystem::path& path, std::size_t bytes_per_row) {
+  constexpr hsize_t kBestCompression = 1032;  // of deflate
+  std::error_code error;
+  const auto size = std::filesystem::file_size(path, error);
+  return error ? 0 : size * kBestCompression / bytes_per_row;
+}
+
+std::vector<Alarm> read_alarms(hid_t file, const std::filesystem::path& path) {
   const Handle table(H5Dopen2(file, "alarms", H5P_DEFAULT));
   if (!table.ok()) return {};
-  std::vector<AlarmRow> rows(row_count(table, nullptr));
-  if (rows.empty()) return {};
+  const hsize_t count = size_of(table, 1)[0];
+  if (count == 0) return {};
+  if (count > most_rows(path, sizeof(AlarmRow))) {
+    errno = 0;
+    fail(path, kDamaged);
+  }
+  std::vector<AlarmRow> rows(count);
   const Handle type = alarm_type(), space(H5Dget_space(table));
   if (H5Dread(table, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()) < 0) return {};
   std::vector<Alarm> alarms;
@@ -59,12 +83,68 @@ std::optional<RunEnd> read_end(hid_t file) {
 
 RecordingReader::RecordingReader(const std::filesystem::path& path)
     : path_(find_recording(path)), file_(std::make_unique<File>()) {
+  const Seal seal = seal_of(path_);
+  if (seal == Seal::broken) {
+    errno = 0;
+    fail(path_, "the recording was changed after it was closed, or is damaged");
+  }
+  if (seal == Seal::none) {
+    try_in_child();
+    if (path_.extension() != ".partial") missing_.emplace_back("seal");
+  }
+  open();
+}
+
+/// Reads everything once in a child process; throws what that finds, or that it died of it.
+void RecordingReader::try_in_child() {
+  // HDF5 may also run for ever; a sound file takes a hundredth of this.
+  constexpr rlim_t kShortest = 1, kBytesPerSecond = 10'000'000;
+  std::error_code unknown;
+  const rlim_t seconds = kShortest + std::filesystem::file_size(path_, unknown) / kBytesPerSecond;
+  std::array<int, 2> answer{-1, -1};  // the sentence, where the file is refused
+  const pid_t child = pipe2(answer.data(), O_CLOEXEC) == 0 ? fork() : -1;
+  if (child == 0) {
+    for (const int deadly : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) signal(deadly, SIG_DFL);
+    const rlimit none{0, 0}, time{seconds, seconds};
+    setrlimit(RLIMIT_CORE, &none);
+    setrlimit(RLIMIT_CPU, &time);
+    bool opened = false;
+    try {
+      open();
+      opened = true;
+      for_each([](const TelemetryRow&) {});
+    } catch (const RecordingError& e) {
+      const std::string_view text = e.what();  // rows that cannot be read: whoever asks for them
+      if (!opened && ::write(answer[1], text.data(), text.size()) < 0) _exit(1);
+    } catch (...) {
+      _exit(1);
+    }
+    _exit(0);
+  }
+  close(answer[1]);
+  std::string refusal;
+  std::array<char, 512> part{};
+  for (ssize_t got; child > 0 && (got = ::read(answer[0], part.data(), part.size())) != 0;)
+    if (got > 0)
+      refusal.append(part.data(), static_cast<std::size_t>(got));
+    else if (errno != EINTR)
+      break;
+  close(answer[0]);
+  if (child < 0) fail(path_, "no process to check the recording in");
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  errno = 0;
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) fail(path_, kDamaged);
+  if (!refusal.empty()) throw RecordingError(refusal);
+}
+
+void RecordingReader::open() {
   const Quiet quiet;
   File& f = *file_;
   f.file = Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
   if (!f.file.ok())
-    fail(path_, H5Fis_hdf5(path_.c_str()) > 0 ? "the recording is damaged and cannot be opened"
-                                              : "is not an HDF5 file or cannot be read");
+    fail(path_, H5Fis_hdf5(path_.c_str()) > 0 ? kDamaged : "is not an HDF5 file or cannot be read");
   std::string format;
   std::int64_t version = 0;
   errno = 0;
@@ -81,14 +161,16 @@ RecordingReader::RecordingReader(const std::filesystem::path& path)
   need(read(f.file, "machine_toml", begin_.declared_toml), "machine");
   need(read(f.file, "piece_toml", begin_.piece_toml), "piece");
   need(read(f.file, "seed", begin_.seed), "seed");
-  hsize_t width = 0;
   f.rows = Handle(H5Dopen2(f.file, "rows", H5P_DEFAULT));
   if (!f.rows.ok()) fail(path_, "holds no rows");
-  rows_ = row_count(f.rows, &width);
+  const auto [rows, width] = size_of(f.rows, 2);
   if (width != kRowWidth)
     throw RecordingError(fmt::format("{}: rows have {} channels; this program reads {}",
                                      path_.string(), width, kRowWidth));
-  alarms_ = read_alarms(f.file);
+  errno = 0;
+  if (rows > most_rows(path_, sizeof(TelemetryRow))) fail(path_, kDamaged);
+  rows_ = rows;
+  alarms_ = read_alarms(f.file, path_);
   if (const auto end = read_end(f.file)) {
     end_ = *end;
   } else {

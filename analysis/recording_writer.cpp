@@ -3,6 +3,7 @@
 
 #include "analysis/hdf5_file.hpp"
 #include "analysis/recording.hpp"
+#include "analysis/seal.hpp"
 
 namespace vcnc {
 
@@ -123,6 +124,7 @@ void RecordingWriter::finish(const RunEnd& end) {
   f.rows = Handle();
   f.alarms = Handle();
   written = H5Fclose(f.file.release()) >= 0 && written;
+  written = written && put_seal(partial(f.path));
   if (!written) fail(f.path, "the recording cannot be completed");
   std::error_code error;
   std::filesystem::rename(partial(f.path), f.path, error);

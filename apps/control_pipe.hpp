@@ -1,4 +1,5 @@
-// The line of text a process sends to the one that launched it: "ready", then "progress ...".
+// The lines of text a process sends to the one that launched it: "ready", then "progress ..." and,
+// for people and to be kept, "note ...".
 #pragma once
 
 #include <string>
@@ -13,6 +14,7 @@ class ControlPipe {
 
   void ready() const { line("ready"); }
   void progress(std::string_view text) const { line(std::string("progress ") + std::string(text)); }
+  void note(std::string_view text) const { line(std::string("note ") + std::string(text)); }
 
  private:
   void line(std::string text) const;

@@ -397,6 +397,8 @@ Experiment experiment(Showing showing, std::size_t axis, const Machine& machine,
   e.axis = axis;
   e.machine = declared(machine);
   e.machine.setup.piece.clear();
+  // What runs free runs at the feeds of cutting.
+  e.machine.probe.in_spindle = options.wall != ExperimentOptions::Wall::none;
   switch (showing) {
     case Showing::circle:
     case Showing::circle_feeds:

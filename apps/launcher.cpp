@@ -88,6 +88,7 @@ bool Launcher::read_lines(Child& child, const OnProgress& on_progress) {
     const std::string line = child.partial_line.substr(0, end);
     child.partial_line.erase(0, end + 1);
     if (line == "ready") child.ready = true;
+    if (line.starts_with("note ")) child.notes.push_back(line.substr(5));
     if (line.starts_with("progress ") && on_progress) on_progress(line.substr(9));
   }
   return true;
@@ -99,7 +100,7 @@ Exited Launcher::reap(std::size_t index) {
   int status = 0;
   while (::waitpid(child.pid, &status, 0) < 0 && errno == EINTR) {
   }
-  Exited exited{.name = child.name, .last_words = read_words(child.words)};
+  Exited exited{.name = child.name, .last_words = read_words(child.words), .notes = child.notes};
   if (WIFSIGNALED(status)) {
     exited.code = 128 + WTERMSIG(status);
     exited.how =

@@ -24,9 +24,10 @@ class LaunchError : public std::runtime_error {
 /// A process that ended.
 struct Exited {
   std::string name;
-  int code = 0;              ///< exit code, or 128 + signal
-  std::string how{};         ///< "exit code 1", "killed by signal 9 (Killed)"
-  std::string last_words{};  ///< what it wrote to stderr, without the trailing newline
+  int code = 0;                      ///< exit code, or 128 + signal
+  std::string how{};                 ///< "exit code 1", "killed by signal 9 (Killed)"
+  std::string last_words{};          ///< what it wrote to stderr, without the trailing newline
+  std::vector<std::string> notes{};  ///< what it told the launcher to keep
 
   std::string sentence() const;  ///< "drive X: killed by signal 9 (Killed): last words"
 };
@@ -64,6 +65,7 @@ class Launcher {
     int words = -1;  ///< memory file behind its stderr
     bool ready = false;
     std::string partial_line{};
+    std::vector<std::string> notes{};
   };
   Exited reap(std::size_t index);
   bool read_lines(Child& child, const OnProgress& on_progress);  ///< false at end of file

@@ -2,9 +2,10 @@
 #pragma once
 
 #include "bus/barrier.hpp"
+#include "bus/fault.hpp"
 
 namespace vcnc {
 
-Roster machine_roster();
+Roster machine_roster(const BusFaults& faults = {});
 
 }  // namespace vcnc

@@ -1,6 +1,7 @@
 // vcnc-nc: the NC unit. Master of the bus, plays the program, publishes the samples over DDS.
 #include <iostream>
 
+#include "apps/faults.hpp"
 #include "apps/nc_run.hpp"
 #include "apps/node_options.hpp"
 #include "apps/stop_signal.hpp"
@@ -27,7 +28,9 @@ int nc(int argc, char** argv) {
        .pace = options.pace,
        .seed = options.seed,
        .piece_toml = machine.setup.piece.empty() ? "" : to_toml(load_piece(machine.setup.piece)),
-       .stop = &stop_requested()},
+       .stop = &stop_requested(),
+       .faults = parse_faults(options.faults),
+       .answer_timeout_ms = options.answer_timeout_ms},
       *transport, publisher);
   if (result.exit_code() == kExitFailure) std::cerr << result.end.reason;
   return result.exit_code();

@@ -13,6 +13,7 @@
 namespace vcnc {
 
 int NcRunResult::exit_code() const {
+  if (node_lost) return kExitFailure;
   if (alarmed) return kExitAlarm;
   if (end.complete) return kExitOk;
   return interrupted ? kExitInterrupted : kExitFailure;
@@ -27,13 +28,18 @@ NcRunResult run_nc(const Machine& machine, const NcRunOptions& options, Transpor
               .piece_toml = options.piece_toml,
               .seed = options.seed});
   Pacer pacer(options.pace);
+  FaultedMaster faulted(nc, options.faults);
+  Master& master = concerns(options.faults, kNcUnitName) ? static_cast<Master&>(faulted) : nc;
   const MainLoopResult loop =
-      run_main_loop(nc, transport, machine_roster(),
+      run_main_loop(master, transport, machine_roster(options.faults),
                     {.pacer = pacer,
                      .rates = {machine.bus.nominal_bit_rate, machine.bus.data_bit_rate},
+                     .answer_timeout_ms = options.answer_timeout_ms,
+                     .taps = options.taps,
                      .stop = options.stop});
   NcRunResult result;
   result.alarmed = nc.alarmed();
+  result.node_lost = !loop.lost_nodes.empty();
   result.interrupted = !loop.complete && options.stop && *options.stop;
   result.end = {.complete = loop.complete && nc.complete(),
                 .reason = result.interrupted     ? "stopped by the operator"

@@ -4,7 +4,10 @@
 #include <atomic>
 #include <cstdint>
 #include <string>
+#include <vector>
 
+#include "bus/fault.hpp"
+#include "bus/main_loop.hpp"
 #include "bus/telemetry.hpp"
 #include "bus/transport.hpp"
 #include "model/machine.hpp"
@@ -17,12 +20,16 @@ struct NcRunOptions {
   std::uint64_t seed = 1;
   std::string piece_toml;                   ///< for the record
   const std::atomic<bool>* stop = nullptr;  ///< set: end the run in order (Ctrl-C)
+  BusFaults faults{};                       ///< in simulated time; the modules have the same
+  int answer_timeout_ms = 5000;             ///< of host time, for each module in each cycle
+  std::vector<FrameTap*> taps{};            ///< see every frame
 };
 
 struct NcRunResult {
   RunEnd end;
   bool alarmed = false;      ///< the machine stopped in an alarm
   bool interrupted = false;  ///< Ctrl-C
+  bool node_lost = false;    ///< a module's program failed
   int exit_code() const;
 };
 

@@ -18,7 +18,14 @@ NodeOptions parse_node_options(int argc, char** argv, const char* description, c
     app.add_option("--pace", o.pace, "times real time, 0 = free-running")
         ->check(CLI::NonNegativeNumber);
   }
-  if (with('b')) app.add_option("--bus", o.bus, "hub:///PATH or can://INTERFACE")->required();
+  if (with('b')) {
+    app.add_option("--bus", o.bus, "hub:///PATH or can://INTERFACE")->required();
+    app.add_option("--fault", o.faults, "a fault, e.g. \"probe mute from_s=1.5 for_s=0.005\"")
+        ->allow_extra_args(false);
+    app.add_option("--answer-timeout-ms", o.answer_timeout_ms,
+                   "how long the NC unit waits for a module")
+        ->check(CLI::Range(1, 3600000));
+  }
   if (with('t')) app.add_option("--truth", o.truth, "path of the ground-truth channel")->required();
   if (with('a'))
     app.add_option("--axis", o.axis, "which drive")

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace vcnc {
 
@@ -15,13 +16,15 @@ struct NodeOptions {
   std::string out;      ///< result directory (analysis)
   double pace = 0;      ///< times real time; 0 = free-running
   std::uint64_t seed = 1;
-  bool csv = false;        ///< analysis: also write rows.csv
-  bool no_report = false;  ///< analysis: no report.html
+  std::vector<std::string> faults;  ///< in the text form of bus/fault.hpp
+  int answer_timeout_ms = 5000;     ///< of host time, for each module in each cycle
+  bool csv = false;                 ///< analysis: also write rows.csv
+  bool no_report = false;           ///< analysis: no report.html
   int control_fd = -1;
 };
 
 /// What a module program needs; each letter enables one option: m machine, p program and pace,
-/// b bus, t truth, a axis, o out, s seed.
+/// b bus, faults and answer time-out, t truth, a axis, o out, s seed.
 NodeOptions parse_node_options(int argc, char** argv, const char* description, const char* needs);
 
 /// Runs a program's body: prints an exception as one line on stderr and turns it into exit code 2

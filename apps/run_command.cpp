@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -12,6 +14,8 @@
 #include <iostream>
 
 #include "analysis/session.hpp"
+#include "apps/faults.hpp"
+#include "apps/host_faults.hpp"
 #include "apps/launcher.hpp"
 #include "apps/live_line.hpp"
 #include "apps/nc_run.hpp"
@@ -50,8 +54,12 @@ std::unique_ptr<PieceParams> piece_of(const Machine& machine) {
 }
 
 int run_in_process(const RunOptions& options, const Machine& machine, const PieceParams* piece,
-                   const RunFolder& folder) {
-  VirtualMachine modules(machine, piece, options.seed);
+                   const BusFaults& faults, const RunFolder& folder) {
+  for (const BusFault& fault : faults)
+    if (fault.of_host())
+      throw InputError("--fault \"" + fault.text +
+                       "\": needs processes; this run has all modules in one");
+  VirtualMachine modules(machine, piece, options.seed, faults);
   InprocTransport transport(modules.nodes());
   AnalysisSession session({.folder = folder.path(), .report = options.report, .csv = options.csv});
   ProgressLine progress;
@@ -61,7 +69,8 @@ int run_in_process(const RunOptions& options, const Machine& machine, const Piec
                                      .pace = options.pace,
                                      .seed = options.seed,
                                      .piece_toml = piece ? to_toml(*piece) : "",
-                                     .stop = &stop_requested()},
+                                     .stop = &stop_requested(),
+                                     .faults = faults},
                                     transport, live);
   progress.clear();
   if (session.summary()) std::cout << to_text(*session.summary());
@@ -104,19 +113,39 @@ class SocketFolder {
   fs::path path_;
 };
 
+/// Options that every module on the bus has.
+std::vector<std::string> common_options(const RunOptions& options) {
+  std::vector<std::string> common{"--answer-timeout-ms",
+                                  std::to_string(std::lround(options.answer_timeout_s * 1e3))};
+  for (const std::string& fault : options.faults) {
+    common.push_back("--fault");
+    common.push_back(fault);
+  }
+  return common;
+}
+
+std::vector<std::string> with(std::vector<std::string> argv, const std::vector<std::string>& more) {
+  argv.insert(argv.end(), more.begin(), more.end());
+  return argv;
+}
+
 /// Starts every module and the analysis, and waits until all are ready.
 void start_modules(Launcher& launcher, const RunOptions& options, const RunFolder& folder,
                    const std::string& bus, const std::string& truth) {
   const std::string bin = program_directory();
   const std::string machine = folder.machine_file();
   const std::string seed = std::to_string(options.seed);
+  const std::vector<std::string> common = common_options(options);
   for (const char* axis : {"X", "Y", "Z", "A", "C", "spindle"})
     launcher.start(fmt::format("drive {}", axis),
-                   {bin + "/vcnc-drive", "--machine", machine, "--bus", bus, "--truth", truth,
-                    "--axis", axis, "--seed", seed});
-  launcher.start("probe", {bin + "/vcnc-probe", "--machine", machine, "--bus", bus, "--truth",
-                           truth, "--seed", seed});
-  launcher.start("overtravel", {bin + "/vcnc-overtravel", "--machine", machine, "--bus", bus});
+                   with({bin + "/vcnc-drive", "--machine", machine, "--bus", bus, "--truth", truth,
+                         "--axis", axis, "--seed", seed},
+                        common));
+  launcher.start("probe", with({bin + "/vcnc-probe", "--machine", machine, "--bus", bus, "--truth",
+                                truth, "--seed", seed},
+                               common));
+  launcher.start("overtravel",
+                 with({bin + "/vcnc-overtravel", "--machine", machine, "--bus", bus}, common));
   std::vector<std::string> analysis{bin + "/vcnc-analysis", "--out", folder.path().string()};
   if (options.csv) analysis.push_back("--csv");
   if (!options.report) analysis.push_back("--no-report");
@@ -126,23 +155,28 @@ void start_modules(Launcher& launcher, const RunOptions& options, const RunFolde
 
 struct RunEnded {
   int nc_code = kExitFailure;
-  std::string failure;  ///< the cause; what follows from it is not told
+  std::string failure;             ///< the cause; what follows from it is not told
+  std::vector<std::string> notes;  ///< "drive Y: came to rest ..."
 };
 
 /// Shows the progress until every process has ended; sees to it that they do.
 class Watch {
  public:
-  Watch(Launcher& launcher, const RunFolder& folder) : launcher_(launcher), folder_(folder) {}
+  Watch(Launcher& launcher, const RunFolder& folder, const BusFaults& faults)
+      : launcher_(launcher), folder_(folder), host_faults_(faults) {}
 
   RunEnded until_all_ended() {
-    constexpr int kStepMs = 100;
+    const int step_ms = host_faults_.empty() ? 100 : 5;
     while (launcher_.running() > 0) {
       if (stop_requested() && !told_to_stop_) stop("stopping ...");
-      const auto exited =
-          launcher_.next(kStepMs, [&](const std::string& text) { progress_.show(text); });
+      host_faults_.act(launcher_);
+      const auto exited = launcher_.next(step_ms, [&](const std::string& text) {
+        progress_.show(text);
+        host_faults_.note(text);
+      });
       if (exited) {
         note(*exited);
-      } else if (ending_ && (patience_ms_ -= kStepMs) <= 0) {
+      } else if (ending_ && (patience_ms_ -= step_ms) <= 0) {
         if (stop_requested())
           nc_code_ = kExitInterrupted;
         else if (failure_.empty())
@@ -150,7 +184,7 @@ class Watch {
         launcher_.kill_all();
       }
     }
-    return {nc_code_.value_or(kExitFailure), !failure_.empty() ? failure_ : consequence_};
+    return {nc_code_.value_or(kExitFailure), !failure_.empty() ? failure_ : consequence_, notes_};
   }
 
  private:
@@ -164,6 +198,7 @@ class Watch {
   void note(const Exited& exited) {
     const bool nc = exited.name == "NC unit";
     if (nc) nc_code_ = exited.code;
+    for (const std::string& text : exited.notes) notes_.push_back(exited.name + ": " + text);
     const bool dismissed = exited.name == "analysis" && dismissed_;
     const bool expected = exited.code == kExitOk || dismissed ||
                           (nc && (exited.code == kExitAlarm || exited.code == kExitInterrupted));
@@ -174,6 +209,10 @@ class Watch {
 
     if (exited.name == "analysis" && !expected && launcher_.running("NC unit"))
       stop("the analysis has died, stopping ...");
+    if (exited.code == kExitBusGone && !ending_ && launcher_.running("NC unit"))
+      stop("the NC unit gives no SYNC, stopping ...");
+    if (exited.name == "analysis" && ending_)  // nobody has anything to write any more
+      patience_ms_ = std::min(patience_ms_, kStopTimeoutMs);
     if (!nc) return;
     ending_ = true;
     const bool results_to_write = launcher_.running("analysis") && folder_.has_recording();
@@ -189,12 +228,14 @@ class Watch {
   const RunFolder& folder_;
   ProgressLine progress_;
   std::optional<int> nc_code_;
+  HostFaults host_faults_;
   std::string failure_, consequence_;
+  std::vector<std::string> notes_;
   bool told_to_stop_ = false, ending_ = false, dismissed_ = false;
   int patience_ms_ = 0;
 };
 
-int run_processes(const RunOptions& options, const RunFolder& folder) {
+int run_processes(const RunOptions& options, const BusFaults& faults, const RunFolder& folder) {
   SocketFolder sockets;
   std::string bus = options.bus;
   std::unique_ptr<Hub> hub;
@@ -209,11 +250,14 @@ int run_processes(const RunOptions& options, const RunFolder& folder) {
   start_modules(launcher, options, folder, bus, sockets.file("truth"));
   if (stop_requested()) return kExitInterrupted;
   launcher.start("NC unit",
-                 {program_directory() + "/vcnc-nc", "--machine", folder.machine_file(), "--program",
-                  fs::absolute(options.program).string(), "--bus", bus, "--pace",
-                  fmt::format("{}", options.pace), "--seed", std::to_string(options.seed)});
+                 with({program_directory() + "/vcnc-nc", "--machine", folder.machine_file(),
+                       "--program", fs::absolute(options.program).string(), "--bus", bus, "--pace",
+                       fmt::format("{}", options.pace), "--seed", std::to_string(options.seed)},
+                      common_options(options)));
 
-  const RunEnded ended = Watch(launcher, folder).until_all_ended();
+  const RunEnded ended = Watch(launcher, folder, faults).until_all_ended();
+  for (const std::string& note : ended.notes) std::cerr << "vcnc: " << note << '\n';
+  folder.write_notes(ended.notes);
   std::cout << text_of(folder.path() / "summary.txt");
   if (ended.failure.empty()) return ended.nc_code;
   std::cerr << "vcnc: " << ended.failure << '\n';
@@ -227,14 +271,15 @@ int run_command(const RunOptions& options) {
   const std::unique_ptr<PieceParams> piece = piece_of(machine);
   Player(options.program,
          as_nc_believes(machine));  // refuses a wrong program before anything is started or written
+  const BusFaults faults = parse_faults(options.faults);
   const bool in_process = options.in_process || options.bus == "inproc://";
   if (!in_process && options.bus != "hub://") check_bus(options.bus);
   catch_stop_signals();
   RunFolder folder(options.out, {options.program, options.machine, machine.setup.piece});
   try {
     folder.write_inputs(machine, piece.get());
-    const int code = in_process ? run_in_process(options, machine, piece.get(), folder)
-                                : run_processes(options, folder);
+    const int code = in_process ? run_in_process(options, machine, piece.get(), faults, folder)
+                                : run_processes(options, faults, folder);
     folder.remove_if_without_results();
     if (fs::exists(folder.path() / "report.html"))
       std::cout << "report: " << (folder.path() / "report.html").string() << '\n';

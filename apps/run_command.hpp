@@ -13,6 +13,8 @@ struct RunOptions {
   std::string machine;
   std::vector<std::string> assignments;  ///< --set key=value
   std::vector<std::string> injections;   ///< --inject key=value
+  std::vector<std::string> faults;       ///< --fault, in the text form of bus/fault.hpp
+  double answer_timeout_s = 5;           ///< the NC unit's patience with a module, in host time
   std::string bus = "hub://";            ///< hub:// picks a path of its own
   double pace = 0;                       ///< times real time, 0 = free-running
   std::uint64_t seed = 1;

@@ -14,8 +14,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array kFiles{"machine.toml", "piece.toml",  "recording.h5", "recording.h5.partial",
-                            "summary.json", "summary.txt", "report.html",  "rows.csv"};
+constexpr std::array kFiles{"machine.toml",  "piece.toml",   "recording.h5", "recording.h5.partial",
+                            "summary.json",  "summary.txt",  "report.html",  "rows.csv",
+                            "program.ngc",   "scenario.toml", "notes.txt"};
 
 /// First line of the machine file that a run leaves: the folder is ours.
 const std::string kMark = "# Written by vcnc run: the machine as it was run.\n";
@@ -67,6 +68,12 @@ void RunFolder::write_inputs(const Machine& machine, const PieceParams* piece) {
     resolved.setup.piece = "piece.toml";
   }
   write_text(machine_file(), kMark + to_toml(resolved));
+}
+
+void RunFolder::write_notes(const std::vector<std::string>& notes) const {
+  std::string text;
+  for (const std::string& note : notes) text += note + '\n';
+  if (!text.empty()) write_text(path_ / "notes.txt", text);
 }
 
 bool RunFolder::has_recording() const {

@@ -21,6 +21,9 @@ class RunFolder {
   /// machine.toml (all keys, as run) and piece.toml; self-contained: the machine names this piece.
   void write_inputs(const Machine& machine, const PieceParams* piece);
 
+  /// notes.txt, a line each; no file without notes.
+  void write_notes(const std::vector<std::string>& notes) const;
+
   const std::filesystem::path& path() const { return path_; }
   std::string machine_file() const { return (path_ / "machine.toml").string(); }
   std::string piece_file() const { return (path_ / "piece.toml").string(); }

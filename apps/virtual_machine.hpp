@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "bus/fault.hpp"
 #include "bus/node.hpp"
 #include "bus/truth.hpp"
 #include "model/machine.hpp"
@@ -12,17 +13,27 @@
 
 namespace vcnc {
 
+class ProbeNode;
+
 /// All modules but the NC unit.
 class VirtualMachine {
  public:
-  VirtualMachine(const Machine& machine, const PieceParams* piece, std::uint64_t seed);
+  /// `faults`: those of the host are passed over.
+  VirtualMachine(const Machine& machine, const PieceParams* piece, std::uint64_t seed,
+                 const BusFaults& faults = {});
 
-  /// In roster order; valid as long as this object.
+  /// In roster order, with their faults; valid as long as this object.
   std::vector<Node*> nodes() const;
+  /// The module itself, inside of its faults.
+  const Node& module(int id) const;
+  /// For observers of the true deflection.
+  const ProbeNode& probe() const { return *probe_; }
 
  private:
   std::unique_ptr<TruthPort> truth_;
   std::vector<std::unique_ptr<Node>> nodes_;
+  std::vector<std::unique_ptr<Node>> faulted_;  ///< null where a node has none
+  const ProbeNode* probe_ = nullptr;  ///< one of nodes_
 };
 
 }  // namespace vcnc

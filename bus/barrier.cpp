@@ -27,6 +27,7 @@ Barrier::Barrier(Transport& bus, const Roster& roster, const std::atomic<bool>* 
     if (expected_[id])
       throw std::invalid_argument(fmt::format("node id {} of {} is used twice", id, entry.name));
     expected_.set(id);
+    tokens_.set(id, entry.token);
   }
 }
 
@@ -44,21 +45,42 @@ std::string Barrier::missing() const {
   return names;
 }
 
-void Barrier::note(Tick k, const Frame& frame) {
-  if (frame.id > kStatusBase && frame.id < kStatusBase + 128) {
-    const auto id = static_cast<std::size_t>(frame.id - kStatusBase);
-    if (!expected_[id]) return;
-    if (arrived_[id])
-      throw BarrierError(
-          fmt::format("{} answered twice in cycle {}", name(static_cast<int>(id)), k));
+void Barrier::lose(Tick k, std::size_t id, const std::string& why) {
+  expected_.reset(id);
+  gone_.set(id);
+  lost_.push_back({static_cast<int>(id), name(static_cast<int>(id)), k, why});
+}
+
+/// Whether the frame is one for the master.
+bool Barrier::note(Tick k, const Frame& frame) {
+  const auto node_of = [&](int base) {
+    return frame.id > base && frame.id < base + 128 ? static_cast<std::size_t>(frame.id - base) : 0;
+  };
+  if (const std::size_t id = node_of(kTokenBase)) {
+    if (expected_[id] && tokens_[id]) arrived_.set(id);
+    return false;
+  }
+  for (const int base : {kEmcyBase, kStatusBase, kHeartbeatBase})
+    if (const std::size_t id = node_of(base); id > 0 && gone_[id]) {
+      ++late_frames_;
+      return false;
+    }
+  if (const std::size_t id = node_of(kStatusBase)) {
+    if (!expected_[id] || tokens_[id]) return true;
+    if (arrived_[id]) {
+      lose(k, id, fmt::format("{} answered twice in cycle {}", name(static_cast<int>(id)), k));
+      return false;
+    }
     arrived_.set(id);
   } else if (const auto heartbeat = decode_heartbeat(frame)) {
-    if (!expected_[static_cast<std::size_t>(heartbeat->node)]) return;
+    const auto node = static_cast<std::size_t>(heartbeat->node);
+    if (!expected_[node]) return true;
     if (heartbeat->state == NmtState::boot_up)
-      throw BarrierError(fmt::format("{} restarted in cycle {}", name(heartbeat->node), k));
+      lose(k, node, fmt::format("{} restarted in cycle {}", name(heartbeat->node), k));
     if (heartbeat->state == NmtState::stopped)
-      throw BarrierError(fmt::format("{} left the bus in cycle {}", name(heartbeat->node), k));
+      lose(k, node, fmt::format("{} left the bus in cycle {}", name(heartbeat->node), k));
   }
+  return true;
 }
 
 bool Barrier::collect(Tick k, Frames& answers, int timeout_ms) {
@@ -73,13 +95,23 @@ bool Barrier::collect(Tick k, Frames& answers, int timeout_ms) {
         throw BarrierError(fmt::format("the bus was closed in cycle {}", k));
       case Transport::Received::timeout:
         waited_ms += slice_ms;
-        if (waited_ms >= timeout_ms)
-          throw BarrierError(
-              fmt::format("no answer within {} ms in cycle {} from: {}", timeout_ms, k, missing()));
+        if (waited_ms < timeout_ms) break;
+        for (std::size_t id = 1; id < expected_.size(); ++id)
+          if (expected_[id] && !arrived_[id])
+            lose(k, id,
+                 fmt::format("no answer within {} ms in cycle {} from: {}", timeout_ms, k,
+                             name(static_cast<int>(id))));
         break;
-      case Transport::Received::frames:
-        for (std::size_t i = known; i < answers.size(); ++i) note(k, answers[i]);
+      case Transport::Received::frames: {
+        std::size_t kept = known;
+        for (std::size_t i = known; i < answers.size(); ++i)
+          if (note(k, answers[i])) {
+            if (kept != i) answers[kept] = answers[i];
+            ++kept;
+          }
+        answers.resize(kept);
         break;
+      }
     }
   }
   return true;

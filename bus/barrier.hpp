@@ -1,4 +1,7 @@
-// Waits until every module of a frozen roster has answered, and names those that have not.
+// Waits until every module of the roster has answered, and names those that do not.
+//
+// A module that leaves, restarts, answers twice or stays silent is lost: it is never waited for
+// again and what it says from then on is dropped and counted. The others go on.
 #pragma once
 
 #include <atomic>
@@ -17,10 +20,19 @@ namespace vcnc {
 struct RosterEntry {
   int id = 0;  ///< 1..127
   std::string name;
+  bool token = false;  ///< ends its answers by a token: has faults in simulated time
 };
 using Roster = std::vector<RosterEntry>;
 
-/// A node that is missing, gone or out of step: one sentence naming it.
+/// A module that takes part no more.
+struct LostNode {
+  int id = 0;
+  std::string name;
+  Tick cycle = 0;   ///< the first without it
+  std::string why;  ///< one sentence that names it
+};
+
+/// The bus is gone, or a node is missing at the start: one sentence.
 class BarrierError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -32,15 +44,18 @@ class Barrier {
   Barrier(Transport& bus, const Roster& roster, const std::atomic<bool>* stop = nullptr);
 
   /// Appends all frames of cycle k to `answers`; returns when each node's cyclic frame (COB-ID
-  /// 180h + id, sent as its last) is there. False if `stop` was set meanwhile. Throws BarrierError
-  /// if a node stays silent for timeout_ms, answers twice, restarts or leaves.
+  /// 180h + id, sent as its last) or token is there or the node is lost. False if `stop` was set
+  /// meanwhile. Throws BarrierError if the bus is closed.
   bool collect(Tick k, Frames& answers, int timeout_ms);
+
+  const std::vector<LostNode>& lost() const { return lost_; }
+  std::uint64_t late_frames() const { return late_frames_; }  ///< of lost nodes
 
   /// Start-up: takes what arrives within timeout_ms and notes the nodes whose heartbeat shows this
   /// state; other frames are dropped. Throws BarrierError if the bus is closed or a node leaves it.
   Transport::Received hear(NmtState state, int timeout_ms);
   void forget() { arrived_.reset(); }
-  /// Whether every node of the roster has arrived since forget().
+  /// Whether every node of the roster that is not lost has arrived since forget().
   bool complete() const { return (arrived_ & expected_) == expected_; }
 
   /// Names of those that have not arrived: "drive A, probe".
@@ -48,13 +63,16 @@ class Barrier {
 
  private:
   using Ids = std::bitset<128>;
-  void note(Tick k, const Frame& frame);
+  bool note(Tick k, const Frame& frame);
+  void lose(Tick k, std::size_t id, const std::string& why);
   const std::string& name(int id) const;
 
   Transport& bus_;
   const Roster roster_;
   const std::atomic<bool>* stop_;
-  Ids expected_, arrived_;
+  Ids expected_, arrived_, gone_, tokens_;
+  std::vector<LostNode> lost_;
+  std::uint64_t late_frames_ = 0;
   Frames scratch_;
 };
 

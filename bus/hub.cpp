@@ -26,6 +26,7 @@ struct Client {
   int id = kNoId;
   std::uint64_t lost = 0;  ///< frames its full queue refused
   bool answered = false;   ///< since the master's last datagram
+  bool behind = false;     ///< did not answer the one before: nobody waits for it
   bool gone = false;
   std::vector<std::uint8_t> said;  ///< held for the other nodes
   std::size_t said_frames = 0;
@@ -181,6 +182,7 @@ void Hub::Service::from_master(std::span<const std::uint8_t> slot, std::size_t f
       total += sender->said_frames;
     }
     pieces_.push_back(piece(slot.data(), slot.size()));
+    receiver->behind = !receiver->answered;
     receiver->answered = false;
     deliver(*receiver, total);
   }
@@ -193,6 +195,7 @@ void Hub::Service::from_master(std::span<const std::uint8_t> slot, std::size_t f
 void Hub::Service::from_node(Client& node, std::span<const std::uint8_t> slot, std::size_t frames) {
   if (master_ == nullptr) return;  // a bus without a master does not run
   node.answered = true;
+  node.behind = false;
   if (node.said.size() + slot.size() > kLargestSlot) {
     overruns += node.said_frames;
     node.said.clear();
@@ -260,7 +263,7 @@ void Hub::Service::drop(Client& client) {
 
 bool Hub::Service::all_answered() const {
   return std::all_of(clients_.begin(), clients_.end(),
-                     [](const auto& c) { return !is_node(*c) || c->answered; });
+                     [](const auto& c) { return !is_node(*c) || c->answered || c->behind; });
 }
 
 Hub::Hub(const std::string& path)

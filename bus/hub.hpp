@@ -4,7 +4,7 @@
 // hub and handed to the other nodes together with the master's next datagram, the one with SYNC;
 // latch on SYNC makes that equivalent to handing it over at once, and a node is woken once per
 // cycle. Answers for the master are held until every node that is connected has answered, or for 10
-// ms.
+// ms; a node that did not answer the master's last datagram holds nothing up.
 //
 // End of file means that the module has died. The hub then speaks for a dead node: it sends the
 // master a heartbeat "stopped" (700h+id, 04), so that the master can name it. When the master is

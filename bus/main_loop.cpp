@@ -75,8 +75,13 @@ class Cycle {
       throw BarrierError(
           fmt::format("the host lost {} frames for the NC unit by cycle {}", bus_.lost(), k));
     sort_by_id(answers_);
+    for (; told_ < barrier_.lost().size(); ++told_)
+      master_.node_lost(barrier_.lost()[told_].id, barrier_.lost()[told_].why);
     return true;
   }
+
+  /// Cycles since the first node was lost; 0: none is.
+  Tick degraded(Tick k) const { return told_ == 0 ? 0 : k - barrier_.lost().front().cycle + 1; }
 
   bool step(Tick k) {
     commands_.clear();
@@ -109,6 +114,7 @@ class Cycle {
   Frames frames_, answers_, commands_;
   TraceHash hash_;
   double load_ = 0;
+  std::size_t told_ = 0;  ///< lost nodes of which the master knows
 };
 
 void run_cycles(Cycle& cycle, const MainLoopOptions& options, MainLoopResult& result) {
@@ -120,9 +126,10 @@ void run_cycles(Cycle& cycle, const MainLoopOptions& options, MainLoopResult& re
     cycle.command();
     cycle.log(k, result);
     if (!more) {
-      result.complete = true;
+      result.complete = cycle.degraded(k) == 0;
       return;
     }
+    if (cycle.degraded(k) >= options.degraded_cycles) return;
   }
   result.failure = "interrupted";
 }
@@ -166,6 +173,9 @@ MainLoopResult run_main_loop(Master& master, Transport& bus, const Roster& roste
     }
   }
   result.lost = bus.lost();
+  result.lost_nodes = barrier.lost();
+  result.late_frames = barrier.late_frames();
+  if (!barrier.lost().empty()) result.failure = barrier.lost().front().why;
   result.trace_hash = cycle.hash();
   return result;
 }

@@ -2,7 +2,7 @@
 //
 //   wait      the pacer says when cycle k may begin (free-running: at once)
 //   sync      SYNC(k) goes out: every node now takes the frames of cycle k-1 and steps to t_k+1
-//   collect   the barrier: every node of the roster has answered, or the run fails by name
+//   collect   the barrier: every node of the roster has answered, or is lost by name
 //   step      the master takes the answers and decides about cycle k+1
 //   command   its frames go out; they act in cycle k+1
 //   log       the frames of cycle k by identifier: trace hash, bus load, taps
@@ -10,8 +10,10 @@
 // Before that, start-up: NMT "reset communication" every 200 ms until every node of the roster has
 // sent its boot-up message, then NMT "start" until every node says that it is operational. Whatever
 // a node sent before lies in front of that answer, so cycle 0 begins with an empty bus. The roster
-// is then frozen: a node that restarts, answers twice or leaves ends the run. After the last cycle,
-// whatever the reason, NMT "stop".
+// is then frozen: a node that restarts, answers twice, leaves or stays silent is lost. The master
+// is told, the cycle goes on without it until the master has brought the machine to rest, for
+// degraded_cycles at most, and the run has failed. After the last cycle, whatever the reason, NMT
+// "stop".
 #pragma once
 
 #include <atomic>
@@ -40,6 +42,7 @@ struct MainLoopOptions {
   BitRates rates{};
   int answer_timeout_ms = 5000;
   int start_timeout_ms = 15000;
+  Tick degraded_cycles = 10000;  ///< at most so many after the first node was lost
   std::vector<FrameTap*> taps{};
   const std::atomic<bool>* stop = nullptr;  ///< set from outside (Ctrl-C): ends after this cycle
 };
@@ -48,9 +51,11 @@ struct MainLoopResult {
   Tick cycles = 0;            ///< complete cycles
   std::string trace_hash;     ///< over every frame of every complete cycle
   double bus_load_worst = 0;  ///< largest share of a cycle the bus was busy
-  bool complete = false;      ///< the master said that the run is over
-  std::string failure;        ///< why it ended otherwise; names the node
-  std::uint64_t lost = 0;     ///< frames the host dropped on the way to the master
+  bool complete = false;      ///< the master said that the run is over, with no node lost
+  std::string failure;        ///< why not; names the node
+  std::vector<LostNode> lost_nodes;
+  std::uint64_t late_frames = 0;  ///< that lost nodes sent afterwards
+  std::uint64_t lost = 0;         ///< frames the host dropped on the way to the master
 };
 
 /// Runs until the master is done, the bus fails or `stop` is set. Failures of the bus and of nodes

@@ -1,6 +1,7 @@
 #include "bus/messages.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "bus/wire_docs.hpp"
 #include "bus/wire_table.hpp"
@@ -240,9 +241,23 @@ std::optional<OvertravelState> decode_overtravel_state(const Frame& frame) {
   if (!fits(frame, kOvertravelId, kOvertravelLength)) return std::nullopt;
   OvertravelState m;
   wire::take_all<kOvertravelState>(frame, m);
-  if (m.state > OvertravelState::State::tripped || m.cause > OvertravelState::Cause::slip)
+  if (m.state > OvertravelState::State::hard || m.cause > OvertravelState::Cause::runaway)
     return std::nullopt;
   return m;
+}
+
+bool is_finite(const GroupCommand& m) {
+  return std::isfinite(m.spindle_speed) &&
+         std::all_of(m.axes.begin(), m.axes.end(), [](const GroupCommand::Setpoint& s) {
+           return std::isfinite(s.position) && std::isfinite(s.velocity);
+         });
+}
+bool is_finite(const DriveStatus& m) {
+  return std::isfinite(m.position) && std::isfinite(m.second_encoder) && std::isfinite(m.force);
+}
+bool is_finite(const ProbeSample& m) {
+  return std::all_of(m.deflection.begin(), m.deflection.end(),
+                     [](double d) { return std::isfinite(d); });
 }
 
 namespace {

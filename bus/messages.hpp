@@ -16,6 +16,10 @@
 //   188       overtravel  8      OvertravelState
 //   200       NC unit     64     GroupCommand
 //   700+id    any         1      heartbeat, boot-up
+//
+// 780h+id is a token of the simulation, not of the simulated bus: a module with faults in simulated
+// time (bus/fault.hpp) ends its answer with it, so that the barrier knows that it has stepped even
+// if it says nothing. The barrier takes it away; no module, log or hash ever sees it.
 #pragma once
 
 #include <array>
@@ -29,7 +33,8 @@ namespace vcnc {
 
 // ------------------------------------------------------------------ identifiers (CiA 301)
 inline constexpr std::uint16_t kNmtId = 0x000, kSyncId = 0x080, kEmcyBase = 0x080,
-                               kStatusBase = 0x180, kCommandId = 0x200, kHeartbeatBase = 0x700;
+                               kStatusBase = 0x180, kCommandId = 0x200, kHeartbeatBase = 0x700,
+                               kTokenBase = 0x780;
 inline constexpr int kSpindleNode = 6, kProbeNode = 7, kOvertravelNode = 8;
 constexpr int drive_node(std::size_t axis) { return static_cast<int>(axis) + 1; }
 
@@ -111,15 +116,23 @@ struct ProbeSample {
   std::array<std::uint16_t, 6> adc{};  ///< x cos, x sin, y cos, y sin, z cos, z sin
 };
 
+/// EMCY codes of the protocol (bus/node_shell.hpp says when).
+inline constexpr std::uint16_t kCommunicationError = 0x8100, kOverrunError = 0x8110;
+
+/// EMCY code with which the overtravel module tells that it has latched.
+inline constexpr std::uint16_t kOvertravelEmergency = 0xff10;
+
 struct OvertravelState {
-  enum class State : std::uint8_t { normal = 0, warn = 1, tripped = 2 };
+  enum class State : std::uint8_t { normal = 0, warn = 1, soft_stop = 2, hard = 3 };
   enum class Cause : std::uint8_t {
     none = 0,
     range = 1,
     overtravel = 2,
     signal = 3,
     silent = 4,
-    slip = 5
+    slip = 5,
+    limit = 6,
+    runaway = 7
   };
   std::uint16_t tick = 0;
   State state = State::normal;
@@ -147,6 +160,12 @@ std::optional<GroupCommand> decode_group_command(const Frame&);
 std::optional<DriveStatus> decode_drive_status(const Frame&);
 std::optional<ProbeSample> decode_probe_sample(const Frame&);
 std::optional<OvertravelState> decode_overtravel_state(const Frame&);
+
+/// Whether every value is a number. A receiver that acts upon values takes a frame in which one is
+/// none for lost: a single flipped bit can turn zero into "not a number".
+bool is_finite(const GroupCommand&);
+bool is_finite(const DriveStatus&);
+bool is_finite(const ProbeSample&);
 
 constexpr std::uint8_t sync_counter(Tick k) { return static_cast<std::uint8_t>(k % 240 + 1); }
 constexpr std::uint16_t low16(Tick k) { return static_cast<std::uint16_t>(k & 0xffff); }

@@ -7,12 +7,15 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "bus/frame.hpp"
 #include "bus/tick.hpp"
 
 namespace vcnc {
+
+struct BusFault;
 
 class Node {
  public:
@@ -25,6 +28,18 @@ class Node {
   /// One cycle. `inputs` are the accepted frames of cycle k-1 in CAN-ID order; answers are appended
   /// to `out` and must begin with the node's cyclic frame (COB-ID 180h + id).
   virtual void step(Tick k, std::span<const Frame> inputs, Frames& out) = 0;
+  /// Nothing moves and nothing will without a command: the module may be switched off.
+  virtual bool at_rest() const { return true; }
+  /// Told once when the bus has ended: from now on nobody listens, on no channel.
+  virtual void leave_bus() {}
+
+  // Faults in simulated time (bus/fault.hpp).
+  /// A fault of the module's own for the next step; called before each in which it is active.
+  virtual void suffer(const BusFault&) {}
+  /// Its cyclic frame may be missing or come more than once: the shell ends each answer by a token.
+  virtual bool faulted() const { return false; }
+  /// It could send nothing in the last cycle.
+  virtual bool speechless() const { return false; }
 };
 
 /// The one module that drives the cycle (the NC unit).
@@ -36,6 +51,9 @@ class Master {
   virtual bool step(Tick k, std::span<const Frame> answers, Frames& out) = 0;
   /// Told before step(k): the share of the last complete cycle (k-1) in which the bus was busy.
   virtual void cycle_load(double /*share*/) {}
+  /// Told before step(k): this node takes part no more, from cycle k on. `why` names it. The master
+  /// ends the run when it sees fit.
+  virtual void node_lost(int /*id*/, const std::string& /*why*/) {}
 };
 
 }  // namespace vcnc

@@ -38,6 +38,10 @@ void NodeShell::feed(const Frame& frame, Frames& out) {
     if (const auto nmt = decode_nmt(frame)) on_nmt(*nmt, out);
   } else if (frame.id < accepted_.size() && accepted_[frame.id] &&
              state_ == NmtState::operational) {
+    if (arriving_.size() == kMostFrames) {
+      ++surplus_;
+      return;
+    }
     if (is_cyclic(frame.id) && std::any_of(arriving_.begin(), arriving_.end(),
                                            [&](const Frame& f) { return f.id == frame.id; }))
       ++fault_count_[kDouble];
@@ -54,6 +58,7 @@ void NodeShell::on_nmt(const Nmt& nmt, Frames& out) {
       next_tick_ = 0;
       arriving_.clear();
       fault_count_ = {};
+      surplus_ = 0;
       reported_ = {};
       out.push_back(encode(Heartbeat{node_.id(), NmtState::operational}));
       return;
@@ -86,6 +91,12 @@ void NodeShell::on_sync(const Sync& sync, Frames& out) {
   sort_by_id(inputs_);
   const std::size_t first = out.size();
   node_.step(k, inputs_, out);
+  if (node_.faulted()) {
+    if (!node_.speechless()) report_faults(out);
+    Frame& token = out.emplace_back();
+    token.id = static_cast<std::uint16_t>(kTokenBase + node_.id());
+    return;
+  }
   if (out.size() == first || out[first].id != kStatusBase + node_.id())
     throw std::logic_error(std::string(node_.name()) +
                            ": the answer to SYNC must begin with the node's cyclic frame");
@@ -95,7 +106,7 @@ void NodeShell::on_sync(const Sync& sync, Frames& out) {
 }
 
 void NodeShell::report_faults(Frames& out) {
-  fault_count_[kLost] = host_lost_;
+  fault_count_[kLost] = host_lost_ + surplus_;
   for (std::size_t fault = 0; fault < kFaults; ++fault) {
     if (fault_count_[fault] == 0 || reported_[fault]) continue;
     reported_[fault] = true;

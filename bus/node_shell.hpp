@@ -5,12 +5,15 @@
 //   NMT stop     -> over() becomes true
 //   SYNC(k)      -> the frames accepted since SYNC(k-1) are handed to Node::step in CAN-ID order;
 //                   its answers follow, the cyclic frame (180h+id) last, so that whoever has
-//                   received that one has received them all
+//                   received that one has received them all. A module with faults in simulated
+//                   time may say less; a token (780h+id) ends its answer instead
 //
 // The SYNC counter 1..240 is unwrapped to a 64-bit tick. A SYNC that is missing or comes twice, a
 // second cyclic frame of one sender in a cycle, and frames lost by the host are counted, and the
 // first of each kind raises an EMCY with the answer: 8100h, or 8110h for frames the host lost
-// (detail: 1 missed, 2 repeated, 3 double frame, 4 lost; then the count, 32 bit).
+// (detail: 1 missed, 2 repeated, 3 double frame, 4 lost; then the count, 32 bit). More than
+// kMostFrames between two SYNCs, far beyond what a bus can carry in a cycle, are not kept and count
+// as lost.
 #pragma once
 
 #include <array>
@@ -22,10 +25,10 @@
 
 namespace vcnc {
 
-inline constexpr std::uint16_t kCommunicationError = 0x8100, kOverrunError = 0x8110;
-
 class NodeShell {
  public:
+  static constexpr std::size_t kMostFrames = 1024;
+
   /// The node outlives the shell. Throws std::invalid_argument for an id outside 1..127.
   explicit NodeShell(Node& node);
 
@@ -58,7 +61,7 @@ class NodeShell {
   Tick next_tick_ = 0;
   Frames arriving_;  ///< since the last SYNC
   Frames inputs_;    ///< of the cycle being stepped
-  std::uint64_t host_lost_ = 0;
+  std::uint64_t host_lost_ = 0, surplus_ = 0;
   std::array<std::uint64_t, kFaults> fault_count_{};
   std::array<bool, kFaults> reported_{};
 };

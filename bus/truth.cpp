@@ -22,12 +22,15 @@ class TruthStore {
   }
   bool get(Tick k, std::array<TruthCycle, kTruthAxes>& out) const {
     if (k < 0) return false;
+    bool all = true;
     for (std::size_t axis = 0; axis < kTruthAxes; ++axis) {
       const TruthCycle& cycle = cycles_[axis][slot(k)];
-      if (cycle.tick != k) return false;
-      out[axis] = cycle;
+      if (cycle.tick == k)
+        out[axis] = cycle;
+      else
+        all = false;
     }
-    return true;
+    return all;
   }
 
  private:

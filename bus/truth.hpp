@@ -37,7 +37,8 @@ class TruthPort {
   virtual ~TruthPort() = default;
   /// Drive side. Never waits: what a stuck or absent reader cannot take is dropped and counted.
   virtual void publish(std::size_t axis, const TruthCycle& cycle) = 0;
-  /// Probe side: all axes of cycle k. False if one of them is not there; never waits or guesses.
+  /// Probe side: all axes of cycle k. False if one of them is not there, which leaves its entry as
+  /// it was; never waits or guesses.
   virtual bool collect(Tick k, std::array<TruthCycle, kTruthAxes>& out) = 0;
   /// Cycles that could not be delivered so far.
   virtual std::uint64_t dropped() const { return 0; }

@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "configs/scenario.hpp"
 #include "configs/spelling.hpp"
 #include "model/parameters.hpp"
 
@@ -79,6 +80,16 @@ class Reader {
     const auto value = n->value_exact<std::string>();
     if (!value) fail(*n, full(key), "expected a text in quotes");
     v = *value;
+  }
+  void operator()(std::string_view key, std::vector<std::string>& v, const char*) {
+    const toml::node* n = find(key);
+    if (!n) return;
+    v.clear();
+    for (const toml::node& element : array(*n, full(key), "an array of texts")) {
+      const auto value = element.value_exact<std::string>();
+      if (!value) fail(element, full(key), "expected a text in quotes");
+      v.push_back(*value);
+    }
   }
   template <class Enum>
   void choice(std::string_view key, Enum& v,
@@ -192,15 +203,36 @@ class Reader {
 constexpr std::uintmax_t kLargestFile = 4'000'000;
 constexpr std::ptrdiff_t kDeepest = 64;
 
+/// Points that may separate the parts of a key: all of a line but the decimal points of numbers.
+std::ptrdiff_t key_points(std::string_view line) {
+  const auto digit = [&](std::size_t i) {
+    return i < line.size() && line[i] >= '0' && line[i] <= '9';
+  };
+  std::ptrdiff_t points = 0;
+  bool fraction = false;  // a second point makes a number a key again
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '.') {
+      const bool decimal = i > 0 && digit(i - 1) && digit(i + 1) && !fraction;
+      points += decimal ? 0 : 1;
+      fraction = decimal;
+    } else if (!digit(i)) {
+      fraction = false;
+    }
+  }
+  return points;
+}
+
 /// The parser recurses with the depth of dotted keys and brackets; no file of ours is that deep.
 void refuse_deep_lines(std::string_view text, const std::string& name) {
   int line = 1;
   for (std::size_t at = 0; at < text.size(); ++line) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
     const std::string_view one = text.substr(at, end - at);
-    const std::string_view key = one.substr(0, one.find('='));
-    if (std::count(key.begin(), key.end(), '.') > kDeepest)
-      throw ConfigError(fmt::format("{}:{}: a key of more than {} parts", name, line, kDeepest));
+    const std::size_t first = one.find_first_not_of(" \t");
+    const bool comment = first != one.npos && one[first] == '#';
+    if (!comment && key_points(one) > kDeepest)
+      throw ConfigError(fmt::format("{}:{}: a key of more than {} parts",
+                                    name, line, kDeepest));
     at = end + 1;
   }
 }
@@ -360,8 +392,14 @@ Machine load_machine(const std::string& path, const std::vector<std::string>& as
   for (const std::string& injection : injections) inject(table, injection);
   Machine machine = read<Machine>(table);
   check_whole(machine, path);
-  if (!machine.setup.piece.empty())
-    machine.setup.piece = fs::weakly_canonical(base / machine.setup.piece).string();
+  if (!machine.setup.piece.empty()) {
+    std::error_code error;
+    const fs::path piece = fs::weakly_canonical(base / machine.setup.piece, error);
+    if (error)
+      throw ConfigError(
+          fmt::format("{}: setup.piece: {}: {}", path, machine.setup.piece, error.message()));
+    machine.setup.piece = piece.string();
+  }
   return machine;
 }
 
@@ -376,6 +414,20 @@ PieceParams load_piece(const std::string& path) { return parse_piece(read_file(p
 
 PieceParams parse_piece(std::string_view toml, const std::string& name) {
   return read<PieceParams>(parse(toml, name));
+}
+
+Scenario parse_scenario(std::string_view toml, const std::string& name) {
+  const Scenario scenario = read<Scenario>(parse(toml, name));
+  check_scenario(scenario, name);
+  return scenario;
+}
+
+Scenario load_scenario(const std::string& path) {
+  Scenario scenario = parse_scenario(read_file(path), path);
+  const fs::path base = fs::absolute(path).parent_path();
+  for (std::string* file : {&scenario.machine, &scenario.program})
+    if (!file->empty()) *file = fs::weakly_canonical(base / *file).string();
+  return scenario;
 }
 
 }  // namespace vcnc

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "configs/config.hpp"
+#include "configs/scenario.hpp"
 #include "configs/toml_writer.hpp"
 
 namespace vcnc {
@@ -34,6 +35,9 @@ class Reference {
   }
   void operator()(std::string_view key, const std::string& v, const char* doc) {
     row(key, "text", fmt::format("\"{}\"", v), doc);
+  }
+  void operator()(std::string_view key, const std::vector<std::string>&, const char* doc) {
+    row(key, "list of texts", "[]", doc);
   }
   template <class Enum>
   void choice(std::string_view key, const Enum& v,
@@ -96,5 +100,6 @@ std::string machine_key_reference() {
          "belong to what it depends on and where it acts, see there.\n";
 }
 std::string piece_key_reference() { return reference_of<PieceParams>(); }
+std::string scenario_key_reference() { return reference_of<Scenario>(); }
 
 }  // namespace vcnc

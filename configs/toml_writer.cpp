@@ -27,7 +27,7 @@ std::string toml_number(double si, Unit unit) {
   return decimal(value);
 }
 
-void TomlWriter::operator()(std::string_view key, const std::string& v, const char*) {
+std::string TomlWriter::quoted(const std::string& v) {
   std::string escaped;
   for (char c : v) {
     if (c == '"' || c == '\\') escaped += '\\';
@@ -36,7 +36,17 @@ void TomlWriter::operator()(std::string_view key, const std::string& v, const ch
     else
       escaped += c;
   }
-  line(key, "\"" + escaped + "\"");
+  return "\"" + escaped + "\"";
+}
+
+void TomlWriter::operator()(std::string_view key, const std::string& v, const char*) {
+  line(key, quoted(v));
+}
+
+void TomlWriter::operator()(std::string_view key, const std::vector<std::string>& v, const char*) {
+  std::string text;
+  for (const std::string& x : v) text += (text.empty() ? "" : ", ") + quoted(x);
+  line(key, "[" + text + "]");
 }
 
 std::string to_toml(const Machine& machine) {

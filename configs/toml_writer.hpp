@@ -41,6 +41,7 @@ class TomlWriter {
     line(key, v ? "true" : "false");
   }
   void operator()(std::string_view key, const std::string& v, const char*);
+  void operator()(std::string_view key, const std::vector<std::string>& v, const char*);
 
   template <class Enum>
   void choice(std::string_view key, const Enum& v,
@@ -80,6 +81,7 @@ class TomlWriter {
   std::string text() const { return lines_ + tables_; }
 
  private:
+  static std::string quoted(const std::string& v);
   static std::string vec(const Vec3& v, Unit u) {
     return fmt::format("[{}, {}, {}]", toml_number(v.x(), u), toml_number(v.y(), u),
                        toml_number(v.z(), u));

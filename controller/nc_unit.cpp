@@ -15,6 +15,7 @@ constexpr std::uint64_t kNoSeed = 0;  ///< no effect of the NC unit draws random
 constexpr Tick kStartUpCycles = 200;  ///< the drives must be enabled by then
 constexpr Tick kSettleCycles = 100;   ///< after the last set-point, before the run ends
 constexpr Tick kStopCycles = 5000;    ///< at most this long for a stop in an alarm
+constexpr int kSilentCyclesBearable = 2;
 
 cia402::State drive_state(const DriveStatus& status) { return cia402::state_of(status.statusword); }
 
@@ -28,24 +29,6 @@ std::uint16_t bring_up(std::span<const DriveStatus> drives) {
     return cia402::kShutdown;
   if (any(cia402::State::ready)) return cia402::kSwitchOn;
   return cia402::kEnable;
-}
-
-const char* cause_text(OvertravelState::Cause cause) {
-  switch (cause) {
-    case OvertravelState::Cause::range:
-      return "deflection out of the usable range";
-    case OvertravelState::Cause::overtravel:
-      return "the probe's overtravel limit is reached";
-    case OvertravelState::Cause::signal:
-      return "the probe's signals are faulty";
-    case OvertravelState::Cause::silent:
-      return "the probe has fallen silent";
-    case OvertravelState::Cause::slip:
-      return "the probe moved too fast to be counted, its reading is lost";
-    case OvertravelState::Cause::none:
-      break;
-  }
-  return "no cause given";
 }
 
 std::string module_name(int node) {
@@ -63,28 +46,11 @@ std::string module_name(int node) {
   }
 }
 
-const char* emergency_text(std::uint16_t code) {
-  switch (code) {
-    case 0x8100:
-      return "communication disturbed";
-    case 0x8110:
-      return "frames lost";
-    case 0x8130:
-      return "the overtravel module has fallen silent";
-    case 0x8250:
-      return "no command from the NC unit";
-    case 0xff10:
-      return "the overtravel protection has tripped";
-    default:
-      return "a fault of the module";
-  }
-}
-
 }  // namespace
 
 NcUnit::NcUnit(const Machine& machine, const std::string& program, TelemetrySink& sink)
     : machine_(machine),
-      probe_range_(usable_range(machine.probe)),
+      protection_(machine.probe),
       player_(program, machine),
       shaping_(machine_chain<InterpolationPort>(machine.effects, kNoSeed)),
       sink_(sink) {
@@ -93,6 +59,11 @@ NcUnit::NcUnit(const Machine& machine, const std::string& program, TelemetrySink
     measured_[i].position = measured_next_[i].position = machine.axes[i].limits.start;
   }
   earlier_.fill(planned_);
+  for (const AxisParams& axis : machine.axes) {
+    const double stop_s = axis.limits.velocity / axis.limits.acceleration;
+    blind_stop_cycles_ =
+        std::max(blind_stop_cycles_, kSettleCycles + static_cast<Tick>(std::ceil(stop_s / kCycle)));
+  }
 }
 
 bool NcUnit::step(Tick k, std::span<const Frame> answers, Frames& out) {
@@ -103,68 +74,155 @@ bool NcUnit::step(Tick k, std::span<const Frame> answers, Frames& out) {
   sample(k);
   if (ending_since_ < 0) return true;
   const Tick ended = k - ending_since_;
+  if (alarmed_ && ended < blind_stop_cycles_ &&
+      std::any_of(missing_.begin(), missing_.end(), [](bool m) { return m; }))
+    return true;
   return alarmed_ ? !(ended > kSettleCycles && standing()) && ended < kStopCycles
                   : ended < kSettleCycles;
 }
 
+/// Whether a frame of the node, stamped `tick`, is young enough to be believed.
+bool NcUnit::heard(int node, std::uint16_t tick, std::uint16_t expected) {
+  if (static_cast<std::uint16_t>(expected - tick) > kSilentCyclesBearable) return false;
+  int& silent = silent_cycles_[static_cast<std::size_t>(node)];
+  if (silent == 0) stray_id_ = kStatusBase + node;  // a second one in this cycle
+  silent = 0;
+  return true;
+}
+
 void NcUnit::latch(Tick k, std::span<const Frame> answers) {
   measured_ = measured_next_;
+  probe_heard_ = false;
+  stray_id_ = -1;
+  for (int& silent : silent_cycles_) ++silent;
   for (const Frame& frame : answers) {
     if (const auto status = decode_drive_status(frame)) {
+      if (!is_finite(*status) || !heard(status->node, status->tick, low16(k + 1))) continue;
       measured_next_[static_cast<std::size_t>(status->node - 1)] = *status;
     } else if (const auto sample = decode_probe_sample(frame)) {
+      if (!is_finite(*sample) || !heard(kProbeNode, sample->tick, low16(k))) continue;
       probe_ = *sample;
+      probe_heard_ = true;
     } else if (const auto overtravel = decode_overtravel_state(frame)) {
+      if (!heard(kOvertravelNode, overtravel->tick, low16(k))) continue;
       overtravel_ = *overtravel;
-    } else if (const auto emergency = decode_emergency(frame); emergency && emergency->code != 0) {
-      sink_.alarm({k, static_cast<int>(Code::node), module_name(emergency->node),
-                   fmt::format("{} (emergency message {:04X}h)", emergency_text(emergency->code),
-                               emergency->code)});
+    } else if (const auto emergency = decode_emergency(frame)) {
+      if (emergency->code == 0 || emergency->code == kOvertravelEmergency) continue;
+      const AlarmCode code = alarm_of_emergency(emergency->code);
+      if (emergency->node == kSpindleNode &&
+          (code == AlarmCode::command_lost || code == AlarmCode::overtravel_module_lost))
+        spindle_alone_ = code;
+      sink_.alarm(
+          {k, static_cast<int>(code), module_name(emergency->node),
+           fmt::format("{} (emergency message {:04X}h)", alarm_text(code).title, emergency->code)});
+    } else if (!decode_heartbeat(frame)) {
+      stray_id_ = frame.id;
     }
   }
 }
 
-void NcUnit::raise(Tick k, Code code, std::string source, std::string text) {
+void NcUnit::raise(Tick k, AlarmCode code, std::string source, const std::string& detail,
+                   Stop stop) {
+  std::string text = alarm_text(code).title;
+  if (!detail.empty()) text += ": " + detail;
   if (planned_.step.line > 0) text += fmt::format(" (program line {})", planned_.step.line);
   if (!alarmed_) reason_ = fmt::format("alarm {}: {}", static_cast<int>(code), text);
   alarmed_ = true;
   state_ = NcState::alarm;
-  if (ending_since_ < 0) ending_since_ = k;
+  if (stop > stop_) {
+    stop_ = stop;
+    if (stop == Stop::hold) player_.hold();
+    if (stop == Stop::quick) ending_since_ = k;
+  }
   sink_.alarm({k, static_cast<int>(code), std::move(source), std::move(text)});
 }
 
 void NcUnit::supervise(Tick k) {
-  if (alarmed_) return;
-  if (overtravel_.state == OvertravelState::State::tripped) {
-    raise(k, Code::overtravel, "overtravel",
-          fmt::format("overtravel: {}, {:.3f} mm; spindle locked", cause_text(overtravel_.cause),
-                      overtravel_.deflection * 1e3));
-    return;
-  }
-  if (machine_.probe.in_spindle && !probe_range_.contains(Vec3(probe_.deflection.data()))) {
-    raise(k, Code::probe_range, "NC unit",
-          fmt::format(
-              "probe deflection ({:.3f}, {:.3f}, {:.3f}) mm is out of range; spindle locked",
-              probe_.deflection[0] * 1e3, probe_.deflection[1] * 1e3, probe_.deflection[2] * 1e3));
-    return;
-  }
-  if (machine_.probe.in_spindle &&
-      (probe_.flags & (ProbeSample::kSlip | ProbeSample::kSignalFault))) {
-    raise(k, Code::probe_signal, "NC unit",
-          "the probe's reading cannot be trusted any more; spindle locked");
-    return;
-  }
+  watch_modules(k);
+  watch_bus(k);
+  watch_protection(k);
+  if (stop_ == Stop::quick) return;
   if (state_ == NcState::starting) {
-    if (k > kStartUpCycles) raise(k, Code::start_up, "NC unit", "the drives could not be enabled");
+    if (k > kStartUpCycles) raise(k, AlarmCode::drives_not_enabled, "NC unit", "", Stop::quick);
+    return;
+  }
+  watch_drives(k);
+}
+
+/// What the bus says has gone, and what has not been heard for too long.
+void NcUnit::watch_modules(Tick k) {
+  for (const auto& [id, why] : gone_) {
+    missing_[static_cast<std::size_t>(id)] = true;
+    raise(k, AlarmCode::module_gone, module_name(id), why, Stop::quick);
+  }
+  gone_.clear();
+  const auto too_long = [&](int node) {
+    return silent_cycles_[static_cast<std::size_t>(node)] > kSilentCyclesBearable;
+  };
+  bool nobody = true;
+  for (int node = 1; node <= kOvertravelNode; ++node) nobody = nobody && too_long(node);
+  for (int node = 1; node <= kOvertravelNode; ++node) {
+    bool& missing = missing_[static_cast<std::size_t>(node)];
+    if (missing || !too_long(node)) continue;
+    missing = true;
+    raise(k, AlarmCode::module_silent, module_name(node),
+          nobody ? "none is heard any more, the bus itself has failed" : module_name(node),
+          Stop::quick);
+  }
+}
+
+/// Frames that do not belong there are told once; together with an overload they stop the machine.
+void NcUnit::watch_bus(Tick k) {
+  const bool overloaded = stray_id_ >= 0 && bus_load_ > 1;
+  overloaded_cycles_ = overloaded ? overloaded_cycles_ + 1 : 0;
+  if (stray_id_ < 0) return;
+  const std::string which = fmt::format("identifier {:03X}h", stray_id_);
+  if (!stray_told_)
+    sink_.alarm({k, static_cast<int>(AlarmCode::communication_disturbed), "NC unit",
+                 fmt::format("{}: {} does not belong there",
+                             alarm_text(AlarmCode::communication_disturbed).title, which)});
+  stray_told_ = true;
+  if (overloaded_cycles_ == kSilentCyclesBearable + 1)
+    raise(k, AlarmCode::bus_overloaded, "NC unit", which, Stop::quick);
+}
+
+/// The module's protection first, then the NC unit's own, each as hard as it says.
+void NcUnit::watch_protection(Tick k) {
+  protection_.step({.sampled = probe_heard_,
+                    .deflection = Vec3(probe_.deflection.data()),
+                    .overtravel = (probe_.flags & ProbeSample::kOvertravel) != 0,
+                    .signal_fault = (probe_.flags & ProbeSample::kSignalFault) != 0,
+                    .slip = (probe_.flags & ProbeSample::kSlip) != 0},
+                   false);
+  const auto tell = [&](ProtectionState state, ProtectionCause cause, double deflection,
+                        AlarmCode soft, AlarmCode hard, const char* source) {
+    const Stop stop = state == ProtectionState::hard        ? Stop::quick
+                      : state == ProtectionState::soft_stop ? Stop::hold
+                                                            : Stop::none;
+    const bool harder = stop == Stop::quick ? stop_ != Stop::quick : stop_ == Stop::none;
+    if (stop == Stop::none || !harder) return;
+    raise(k, stop == Stop::quick ? hard : soft, source,
+          fmt::format("{}, {:.3f} mm", text_of(cause), deflection * 1e3), stop);
+  };
+  tell(static_cast<ProtectionState>(overtravel_.state),
+       static_cast<ProtectionCause>(overtravel_.cause), overtravel_.deflection,
+       AlarmCode::overtravel_soft, AlarmCode::overtravel_hard, "overtravel");
+  tell(protection_.state(), protection_.cause(), protection_.deflection(),
+       AlarmCode::overtravel_soft_nc, AlarmCode::overtravel_hard_nc, "NC unit");
+}
+
+void NcUnit::watch_drives(Tick k) {
+  if (spindle_alone_) {
+    const std::string spindle = module_name(kSpindleNode);
+    raise(k, *spindle_alone_, spindle, spindle + " has locked itself", Stop::quick);
     return;
   }
   for (std::size_t i = 0; i <= kAxisCount; ++i) {
-    if (drive_state(measured_next_[i]) == cia402::State::operation_enabled) continue;
-    raise(k, Code::drive, i < kAxisCount ? fmt::format("drive {}", kAxisNames[i]) : "drive spindle",
-          fmt::format("{} left operation, statusword {:04X}h",
-                      i < kAxisCount ? fmt::format("drive {}", kAxisNames[i])
-                                     : std::string("the spindle drive"),
-                      measured_next_[i].statusword));
+    if (!seen(i) || drive_state(measured_next_[i]) == cia402::State::operation_enabled) continue;
+    const std::string drive =
+        i < kAxisCount ? fmt::format("drive {}", kAxisNames[i]) : std::string("drive spindle");
+    raise(k, AlarmCode::drive_left_operation, drive,
+          fmt::format("{}, statusword {:04X}h", drive, measured_next_[i].statusword), Stop::quick);
     return;
   }
 }
@@ -192,9 +250,13 @@ void NcUnit::advance(Tick k) {
       reason_ = "program end";
     }
   }
-  if (state_ == NcState::alarm) {  // the drives brake on their own ramps
-    planned_.step.velocity.fill(0);
-    planned_.step.feed = 0;
+  if (state_ == NcState::alarm) {
+    if (stop_ == Stop::quick) {  // the drives brake on their own ramps
+      planned_.step.velocity.fill(0);
+      planned_.step.feed = 0;
+    } else {
+      stop_softly(k);
+    }
     planned_.step.spindle = PlayerStep::Spindle::off;
   }
   planned_.state = state_;
@@ -209,6 +271,25 @@ void NcUnit::shape(Tick k) {
   planned_.step.velocity = signal.velocity;
 }
 
+/// Holds on the path, then takes the probe off what it touches.
+void NcUnit::stop_softly(Tick k) {
+  if (stop_ == Stop::hold) {
+    planned_.step = player_.step();
+    if (!player_.held()) return;
+    planned_.step.velocity.fill(0);
+    planned_.step.feed = 0;
+    if (retracting_since_ == 0) retracting_since_ = k;
+    if (k - retracting_since_ < kSettleCycles) return;  // the deflection of the axes at rest
+    stop_ = Stop::retract;
+    retract_.emplace(machine_, planned_.step.position, Vec3(probe_.deflection.data()));
+    retracting_since_ = k;
+  }
+  const double t = seconds(k - retracting_since_);
+  planned_.step.position = retract_->position(t);
+  planned_.step.velocity = retract_->velocity(t);
+  if (t >= retract_->duration() && ending_since_ < 0) ending_since_ = k;
+}
+
 void NcUnit::command(Tick k, Frames& out) {
   GroupCommand command{.tick = low16(k)};
   switch (state_) {
@@ -216,7 +297,7 @@ void NcUnit::command(Tick k, Frames& out) {
       command.controlword = bring_up(measured_next_);
       break;
     case NcState::alarm:
-      command.controlword = cia402::kQuickStop;
+      command.controlword = stop_ == Stop::quick ? cia402::kQuickStop : cia402::kEnable;
       break;
     default:
       command.controlword = cia402::kEnable;
@@ -252,9 +333,12 @@ void NcUnit::sample(Tick k) {
   sink_.row(row);
 }
 
+bool NcUnit::seen(std::size_t drive) const { return !missing_[drive + 1]; }
+
 bool NcUnit::standing() const {
   for (std::size_t i = 0; i < kAxisCount; ++i)
-    if (std::abs(measured_next_[i].position - measured_[i].position) > 1e-3 * kCycle) return false;
+    if (seen(i) && std::abs(measured_next_[i].position - measured_[i].position) > 1e-3 * kCycle)
+      return false;
   return true;
 }
 

@@ -65,12 +65,12 @@ MotionSample Trajectory::at(double t) const {
 
 std::vector<Trajectory::Excess> Trajectory::verify() const {
   std::vector<Excess> excess;
-  const auto cycles = static_cast<int>(std::ceil(duration() / kCycle));
+  const auto cycles = static_cast<Tick>(std::ceil(duration() / kCycle));
   // The axes rest before and after: three equal positions at both ends.
   std::array<Coordinates, 4> q;  // newest first
   q.fill(axis_point(map_, path_.eval(0)).q);
-  for (int k = 1; k <= cycles + 3; ++k) {
-    const double t = std::min(k * kCycle, duration());
+  for (Tick k = 1; k <= cycles + 3; ++k) {
+    const double t = std::min(static_cast<double>(k) * kCycle, duration());
     const LawPoint law = law_.at(t);
     const PathPoint point = path_.eval(law.s);
     const AxisPoint axes = axis_point(map_, point);

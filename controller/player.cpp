@@ -11,6 +11,7 @@
 #include "controller/path.hpp"
 #include "controller/planner.hpp"
 #include "model/effects/chain.hpp"
+#include "model/safety/protection.hpp"
 
 namespace vcnc {
 namespace {
@@ -19,10 +20,13 @@ namespace {
 constexpr std::size_t kMostMoves = 50'000;
 constexpr double kLongestWay = 200;       ///< [m] of the controlled point
 constexpr double kLongestSeconds = 3600;  ///< at the programmed feed
+constexpr double kMostNodes = 1e7;        ///< of the plan, estimated
+constexpr double kLongestMove = 36000;    ///< [s] at the limits of the axes
 constexpr double kExactCorner = 1.0 * kDegree;
 constexpr double kLargestChord = 2 * kPi / 3;  ///< angle of a chord
 constexpr int kMostChords = 20'000;            ///< per arc
-constexpr double kOrientSeconds = 0.2;         ///< from a standing spindle into its M19 position
+constexpr double kReactionCycles = 5;   ///< from the deflection to braking axes, measured 3 to 4
+constexpr double kOrientSeconds = 0.2;  ///< from a standing spindle into its M19 position
 
 /// About how far the controlled point goes in a move [m].
 double way_of(const Move& move) {
@@ -49,6 +53,24 @@ double seconds_of(const Move& move) {
   return 0;
 }
 
+/// At most about how many nodes planning a move takes: they stand denser than the hat is wide, and
+/// that widens from a corner of the tolerance to at most a few mm (controller/path.hpp).
+double nodes_of(const Move& move) {
+  constexpr double kPerWidth = 4, kLargestStep = 1e-3, kNarrowest = 3;
+  const double way =
+      std::max(way_of(move), Path::kRotaryLength * (move.end - move.start).tail<2>().norm());
+  if (move.kind == Move::Kind::arc) {
+    const double radius = way / std::abs(move.arc.sweep);
+    const double width = std::sqrt(12 * std::min(Path::kArcTolerance, move.tolerance) * radius);
+    return kPerWidth * way / std::min(width, Path::kLargestWidth);
+  }
+  const double narrowest = kNarrowest * move.tolerance;
+  const double widest = std::min(way, Path::kLargestWidth);
+  const double opening =
+      2 * kPerWidth / Path::kWidthSlope * std::log(std::max(1.0, widest / narrowest));
+  return way / kLargestStep + std::min(kPerWidth * way / narrowest, opening);
+}
+
 /// Throws where a position leaves the travel of an axis.
 void check_travel(const Coordinates& q, const Machine& machine, const std::string& where) {
   constexpr double kRounding = 1e-9;
@@ -67,6 +89,17 @@ void check_travel(const Coordinates& q, const Machine& machine, const std::strin
 void check_move(const Move& move, const Machine& machine, const std::string& path_name) {
   const std::string where = path_name + ":" + std::to_string(move.line);
   const FrameMap map(machine.kinematics, move.frame);
+  const Coordinates way = map.to_axes(move.end) - map.to_axes(move.start);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const double share = move.kind == Move::Kind::rapid ? machine.nc.rapid_limit : 1;
+    const double hours = std::abs(way[static_cast<Eigen::Index>(i)]) /
+                         (share * machine.axes[i].limits.velocity) / 3600;
+    if (hours > kLongestMove / 3600)
+      throw ProgramError(
+          fmt::format("{}: at the largest velocity of {} the move would last {:.1f} h; allowed is "
+                      "up to {:.0f} h",
+                      where, kAxisNames[i], hours, kLongestMove / 3600));
+  }
   if (!move.frame.rtcp && move.kind != Move::Kind::arc) {
     check_travel(move.end, machine, where);
     return;
@@ -79,6 +112,42 @@ void check_move(const Move& move, const Machine& machine, const std::string& pat
   for (int i = 0; i <= parts; ++i)
     check_travel(map.to_axes(programmed_point(segment, segment.length * i / parts).x), machine,
                  where);
+}
+
+/// A probe that meets the piece at this feed must come to rest before its mechanism does.
+void check_stopping_distance(const Move& move, const Machine& machine,
+                             const std::string& path_name) {
+  if (!machine.probe.in_spindle || move.feed_mode == Move::Feed::rotary ||
+      move.kind == Move::Kind::rapid)
+    return;
+  const double way = way_of(move), time = seconds_of(move);
+  if (!(way > 0) || !(time > 0)) return;
+  double deceleration = machine.axes[kX].limits.acceleration;
+  for (const std::size_t i : {kY, kZ})
+    deceleration = std::min(deceleration, machine.axes[i].limits.acceleration);
+  const double speed = way / time;
+  const auto allowed = [&](const Vec3& way_in_probe) {
+    return largest_probing_speed(machine.probe, way_in_probe, kReactionCycles * kCycle,
+                                 deceleration);
+  };
+  double most = std::min(allowed(Vec3::UnitX()), allowed(Vec3::UnitZ()));
+  const bool tool_along_z =
+      machine.kinematics.type == KinematicsParams::Type::trunnion && !move.frame.rtcp;
+  const bool turns = move.start.tail<2>() != move.end.tail<2>();
+  if (move.kind == Move::Kind::line && !turns && (move.frame.rtcp || tool_along_z)) {
+    // One direction in the probe's frame: lateral and axial shares of the way.
+    const RotaryPair iso =
+        Kinematics(machine.kinematics, 0, Vec3::Zero()).counted({move.end[kA], move.end[kC]});
+    const Vec3 d = move.frame.rtcp ? tool_axis(iso.a, iso.c) : Vec3(Vec3::UnitZ());
+    const Vec3 direction = (move.end - move.start).head<3>().normalized();
+    const double axial = std::min(std::abs(direction.dot(d)), 1.0);
+    most = allowed({std::sqrt(1 - axial * axial), 0, axial});
+  }
+  if (speed <= most) return;
+  throw ProgramError(fmt::format(
+      "{}:{}: F{:.0f} is too fast for the probe: in a crash it could not be stopped between its "
+      "range and its limit, or not be counted; allowed in this direction is F{:.0f}",
+      path_name, move.line, speed * 60e3, std::floor(most * 60e3)));
 }
 
 /// Angle between the end of one move and the begin of the next, in the path's own metric.
@@ -132,6 +201,39 @@ struct Player::State {
   std::optional<Trajectory> run;
   Tick cycle = 0, cycles = 0;  ///< within the run or the dwell
   PlayerStep step;
+  bool holding = false;
+  Tick hold_cycle = 0;    ///< since the hold
+  double hold_time = 0;   ///< T_h [s]
+  double hold_start = 0;  ///< time on the path when it began [s]
+
+  /// Begins to brake where the run stands now.
+  void begin_hold() {
+    constexpr double kShortest = 10 * kCycle, kShare = 0.5, kSteepest = 1.5;
+    holding = true;
+    hold_cycle = 0;
+    hold_time = kShortest;
+    if (!run) return;
+    hold_start = std::min(seconds(cycle), run->duration());
+    const MotionSample now = run->at(hold_start);
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      hold_time = std::max(hold_time, kSteepest * std::abs(now.dq[i]) /
+                                          (kShare * machine.axes[i].limits.acceleration));
+  }
+
+  bool held() const { return holding && (!run || seconds(hold_cycle) >= hold_time); }
+
+  /// One cycle of braking along the path.
+  void brake() {
+    ++hold_cycle;
+    const double s = std::min(seconds(hold_cycle) / hold_time, 1.0);
+    const double rate = 1 - s * s * (3 - 2 * s);
+    const double passed = hold_time * (s - s * s * s + 0.5 * s * s * s * s);
+    const MotionSample sample = run->at(std::min(hold_start + passed, run->duration()));
+    step.position = sample.q;
+    step.line = sample.line;
+    step.feed = sample.tip_speed * rate;
+    for (std::size_t i = 0; i < kAxisCount; ++i) step.velocity[i] = sample.dq[i] * rate;
+  }
 
   Block take() {
     if (!pending) return program.next();
@@ -144,7 +246,9 @@ struct Player::State {
   void begin_run(Move first) {
     std::vector<Move> moves{std::move(first)};
     double way = way_of(moves.back()), time = seconds_of(moves.back());
-    while (moves.size() < kMostMoves && way < kLongestWay && time < kLongestSeconds) {
+    double nodes = nodes_of(moves.back());
+    while (moves.size() < kMostMoves && way < kLongestWay && time < kLongestSeconds &&
+           nodes < kMostNodes) {
       pending = program.next();
       Move* next = std::get_if<Move>(&*pending);
       if (!next || !continues(moves.back(), *next)) break;
@@ -152,6 +256,7 @@ struct Player::State {
       pending.reset();
       way += way_of(moves.back());
       time += seconds_of(moves.back());
+      nodes += nodes_of(moves.back());
     }
     Path path(as_allowed(std::move(moves)), machine.nc.angle_tolerance);
     if (path.segments().empty()) return;
@@ -234,14 +339,29 @@ struct Player::State {
 Player::Player(const std::string& path, const Machine& machine) {
   GcodeInterpreter check(path, machine);
   for (Block block = check.next(); !std::holds_alternative<ProgramEnd>(block); block = check.next())
-    if (const Move* move = std::get_if<Move>(&block)) check_move(*move, machine, path);
+    if (const Move* move = std::get_if<Move>(&block)) {
+      check_move(*move, machine, path);
+      check_stopping_distance(*move, machine, path);
+    }
   state_ = std::make_unique<State>(path, machine);
 }
 
 Player::~Player() = default;
 
+void Player::hold() {
+  if (!state_->holding) state_->begin_hold();
+}
+
+bool Player::held() const { return state_->held(); }
+
 PlayerStep Player::step() {
   State& state = *state_;
+  if (state.holding) {
+    state.step.velocity = {};
+    state.step.feed = 0;
+    if (state.run) state.brake();
+    return state.step;
+  }
   if (state.cycle >= state.cycles) state.begin_next();
   PlayerStep& step = state.step;
   step.velocity = {};

@@ -34,6 +34,13 @@ class Player {
   /// Next cycle. `start` positions are those of the machine file.
   PlayerStep step();
 
+  /// Feed hold: from the next cycle on the axes come to rest on the path, along
+  ///   d tau / dt = 1 - (3 s^2 - 2 s^3),  s = t / T_h
+  /// with T_h so long that braking takes at most half of every axis' acceleration limit besides
+  /// what the program needs. There is no going on yet.
+  void hold();
+  bool held() const;  ///< at rest after a hold
+
  private:
   struct State;
   std::unique_ptr<State> state_;

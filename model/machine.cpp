@@ -12,7 +12,8 @@ Machine::Machine() {
     AxisParams& axis = axes[i];
     if (!is_rotary(i)) continue;
     axis.limits = {
-        .min = -2 * kPi, .max = 2 * kPi, .velocity = 3.5, .acceleration = 15, .jerk = 150};
+        .min = -2 * kPi, .max = 2 * kPi, .velocity = 3.5, .acceleration = 15, .jerk = 150,
+        .switch_distance = 2 * kDegree};
     axis.mechanics = {
         .load = 2, .motor_inertia = 0.5, .travel_per_turn = 2 * kPi, .force_limit = 500};
   }

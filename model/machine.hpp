@@ -45,6 +45,8 @@ struct KinematicsParams {
 struct AxisLimits {
   double min = -1, max = 1, start = 0;
   double velocity = 0.5, acceleration = 5, jerk = 50;
+  double following_window = 0;     ///< drive fault beyond it; 0: AxisParams::following_window
+  double switch_distance = 0.005;  ///< limit switches beyond the travel limits
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit, bool rotary) {
@@ -61,6 +63,12 @@ struct AxisLimits {
           rotary ? unit::deg_s2 : unit::mm_s2, positive, "largest acceleration");
     visit(rotary ? "jerk_deg_s3" : "jerk_mm_s3", p.jerk, rotary ? unit::deg_s3 : unit::mm_s3,
           positive, "largest jerk");
+    visit(rotary ? "following_window_deg" : "following_window_mm", p.following_window,
+          rotary ? unit::deg : unit::mm, Range{0, 1000},
+          "following error that faults the drive; 0: 1.5 x velocity / Kv and 1 mm or 1 deg");
+    visit(rotary ? "switch_distance_deg" : "switch_distance_mm", p.switch_distance,
+          rotary ? unit::deg : unit::mm, Range{0, 1000},
+          "limit switches stand this far outside the travel limits");
   }
 };
 
@@ -130,6 +138,13 @@ struct AxisParams {
     AxisLimits::fields(p.limits, visit, rotary);
     ServoParams::fields(p.servo, visit);
     MechanicsParams::fields(p.mechanics, visit, rotary);
+  }
+
+  /// Following error that faults the drive [m or rad]. By default one and a half times what an axis
+  /// at full speed lags without feed-forward, and a little.
+  double following_window(bool rotary) const {
+    if (limits.following_window > 0) return limits.following_window;
+    return 1.5 * limits.velocity / servo.kv_per_s + (rotary ? kDegree : 1e-3);
   }
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bus/fault.hpp"
+
 namespace vcnc {
 
 namespace {
@@ -58,7 +60,17 @@ ProbeNode::ProbeNode(const Machine& machine, std::unique_ptr<Piece> piece, std::
       feeling_(machine_chain<DeflectionPort>(machine.effects, seed)),
       counting_(machine_chain<ReadingPort>(machine.effects, seed)),
       truth_(truth),
-      start_(start_position(machine, seed)) {}
+      start_(start_position(machine, seed)),
+      last_known_(start_) {
+  felt_.fill(Vec3::Zero());
+}
+
+void ProbeNode::suffer(const BusFault& fault) {
+  ChannelFault& channel = broken_[static_cast<std::size_t>(fault.channel)];
+  if (fault.kind == BusFault::Kind::wire_break) channel = ChannelFault::wire_break;
+  if (fault.kind == BusFault::Kind::stuck_adc) channel = ChannelFault::stuck;
+  if (fault.kind == BusFault::Kind::saturated) channel = ChannelFault::saturated;
+}
 
 /// Positions, velocities and accelerations of the axes from the last samples.
 void ProbeNode::follow_motion(const AxisVector& q) {
@@ -82,6 +94,8 @@ ToolPose ProbeNode::pose(const AxisVector& q) {
 void ProbeNode::sample(const AxisVector& q) {
   const Moment now{static_cast<double>(samples_) * kSampleTime, kSampleTime, samples_};
   Vec3 deflection = contact_.step(pose(q));
+  felt_[static_cast<std::size_t>((samples_ + kLoopStepsPerCycle - 1) % kLoopStepsPerCycle)] =
+      deflection;
   overtravelled_ = overtravelled(probe_, deflection);
   if (!feeling_.empty()) {
     DeflectionPort::Signal<double> signal{deflection};
@@ -116,20 +130,32 @@ ProbeSample ProbeNode::reading(Tick k) const {
   return reading;
 }
 
-void ProbeNode::step(Tick k, std::span<const Frame>, Frames& out) {
+void ProbeNode::step(Tick k, std::span<const Frame> inputs, Frames& out) {
+  for (std::size_t c = 0; c < channels_.size(); ++c) channels_[c].suffer(broken_[c]);
+  broken_.fill(ChannelFault::none);
   if (k == 0) {
     sample(start_);
   } else {
     std::array<TruthCycle, kTruthAxes> truth;
-    if (!truth_.collect(k - 1, truth))  // a failure of the host, not of the machine
-      throw TruthError("the true motion of cycle " + std::to_string(k - 1) + " did not arrive");
+    if (!truth_.collect(k - 1, truth)) hold_missing(k - 1, inputs, truth);
     for (std::size_t j = 0; j < kLoopStepsPerCycle; ++j) {
-      AxisVector q;
-      for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = truth[i].position[j];
-      sample(q);
+      for (std::size_t i = 0; i < kAxisCount; ++i) last_known_[i] = truth[i].position[j];
+      sample(last_known_);
     }
   }
   out.push_back(encode(reading(k)));
+}
+
+void ProbeNode::hold_missing(Tick k, std::span<const Frame> inputs,
+                             std::array<TruthCycle, kTruthAxes>& truth) const {
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    if (truth[i].tick == k) continue;
+    const auto from_it = [&](const Frame& f) { return f.id == kStatusBase + drive_node(i); };
+    if (std::any_of(inputs.begin(), inputs.end(), from_it))
+      throw TruthError("the true motion of axis " + std::string(kAxisNames[i]) + " in cycle " +
+                       std::to_string(k) + " did not arrive");
+    truth[i].position.fill(last_known_[i]);
+  }
 }
 
 }  // namespace vcnc

@@ -4,6 +4,8 @@
 // us. For each of them the tool's pose follows from the axes and the errors of the machine's
 // bodies, the stylus ball is moved on the piece (ProbeContact) and the three channels are digitised
 // (SignalChannel). The last sample is the deflection at t_k and goes out as ProbeSample.
+//
+// An axis whose simulator is gone, motion and status alike, stays where it was last.
 #pragma once
 
 #include <array>
@@ -28,9 +30,18 @@ class ProbeNode : public Node {
 
   int id() const override { return kProbeNode; }
   std::string_view name() const override { return "probe"; }
-  bool accepts(std::uint16_t) const override { return false; }
+  /// The status of the drives, only to tell a drive that is gone from a failure of the host.
+  bool accepts(std::uint16_t cob_id) const override {
+    return cob_id > kStatusBase && cob_id <= kStatusBase + kAxisCount;
+  }
   /// Throws TruthError when the simulators' own channel failed.
   void step(Tick k, std::span<const Frame> inputs, Frames& out) override;
+  /// wire_break, stuck_adc, saturated
+  void suffer(const BusFault& fault) override;
+
+  /// For observers of a simulation, never for a part of the machine: the true deflections (probe
+  /// frame) of the last cycle; number j belongs to t_k - (9 - j) 100 us.
+  const std::array<Vec3, kLoopStepsPerCycle>& true_deflections() const { return felt_; }
 
  private:
   ProbeNode(const Machine& actual, std::unique_ptr<Piece> piece, std::uint64_t seed,
@@ -39,6 +50,8 @@ class ProbeNode : public Node {
   void sample(const AxisVector& q);
   void follow_motion(const AxisVector& q);
   ProbeSample reading(Tick k) const;
+  void hold_missing(Tick k, std::span<const Frame> inputs,
+                    std::array<TruthCycle, kTruthAxes>& truth) const;
 
   ProbeParams probe_;
   UsableRange range_;
@@ -50,11 +63,13 @@ class ProbeNode : public Node {
   Chain<DeflectionPort> feeling_;
   Chain<ReadingPort> counting_;
   std::array<ChannelSample, 3> last_;
+  std::array<Vec3, kLoopStepsPerCycle> felt_;
   bool overtravelled_ = false;
   std::int64_t samples_ = 0;
   PosePort::Context<double> motion_;  ///< of all axes, where an effect needs it
   TruthPort& truth_;
-  AxisVector start_;
+  AxisVector start_, last_known_;
+  std::array<ChannelFault, 3> broken_{};  ///< in this cycle
 };
 
 }  // namespace vcnc

@@ -108,6 +108,7 @@ void AxisDrive::couple(const TransmissionPort::Signal<double>& transmission) {
 }
 
 double AxisDrive::encoder(double position) {
+  if (encoder_shift_ != 0) position += encoder_shift_;
   if (counting_.empty()) return position;
   EncoderPort::Signal<double> signal{position};
   counting_.step(signal, {});
@@ -181,6 +182,12 @@ AxisCycle AxisDrive::hold() {
   Course course;
   course.fill({setpoint_.position, 0});
   return run(course);
+}
+
+void AxisDrive::follow_up() {
+  const double measured = encoder(feedback_ == ServoParams::Feedback::motor ? x_motor_ : x_load_);
+  const double told = setpoint_.velocity, seen = observer_.velocity();
+  setpoint_ = last_raw_ = last_shaped_ = {measured, std::abs(seen) < std::abs(told) ? seen : told};
 }
 
 bool AxisDrive::standing() const {

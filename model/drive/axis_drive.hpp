@@ -100,6 +100,13 @@ class AxisDrive {
   /// this axis may know of the others. Call it before follow().
   void tell_commands(const AxisVector& position, const AxisVector& velocity);
 
+  /// Takes what is measured for the set-point: braking after a following error starts where the
+  /// axis is, not where it was told to be.
+  void follow_up();
+  /// From now on both measuring systems count this much more [m or rad] (0: right): an encoder that
+  /// has jumped.
+  void shift_encoder(double by) { encoder_shift_ = by; }
+
   bool standing() const;  ///< commanded and measured velocity are (nearly) zero
   double position() const { return setpoint_.position; }
 
@@ -150,6 +157,7 @@ class AxisDrive {
   std::int64_t cycle_ = 0;
   int loop_ = 0;  ///< within the cycle
   int plant_step_ = 0;
+  double encoder_shift_ = 0;
   double x_load_, v_load_ = 0, a_load_ = 0, x_motor_, v_motor_ = 0;
   double force_ref_ = 0, force_ = 0, integral_ = 0, load_force_ = 0;
   AxisSetpoint last_raw_, last_shaped_;

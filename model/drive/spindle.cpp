@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kOrientShare = 0.8;  // of the acceleration, so that the ramp can be followed
 constexpr double kReachShare = 0.9;   // an occurrence that needs more than this is too near
+constexpr double kManyTurns = 1000;   // are not counted one by one
 constexpr double kOrientGain = 60;    // [1/s]
 constexpr double kOrientedAngle = 1e-4, kOrientedSpeed = 1e-2;
 
@@ -30,6 +31,9 @@ double SpindleDrive::toward_angle() const {
   const bool slow = std::abs(speed_) < kOrientGain * kPi / 4;
   if (slow ? ahead > kPi : speed_ < 0) ahead -= 2 * kPi;
   // Too near to stop at this occurrence: take a later one.
+  if (const double turns = std::floor((stopping - std::abs(ahead)) / (2 * kPi));
+      !slow && turns > kManyTurns)
+    ahead += std::copysign(2 * kPi * (turns - 1), speed_);
   if (!slow)
     while (std::abs(ahead) < stopping) ahead += std::copysign(2 * kPi, speed_);
   const double distance = std::abs(ahead);

@@ -10,6 +10,7 @@ namespace vcnc {
 namespace {
 
 constexpr int kSamplesPerSpan = 16;
+constexpr std::size_t kMostSpans = 256;  // the search for gaps takes the square of it
 // A step this short leaves an error of its square over the radius of curvature: below 1e-12 m.
 constexpr double kLastStep = 1e-7;
 constexpr int kMaxIterations = 25;
@@ -47,6 +48,9 @@ double half_gap(const std::vector<Vec3>& middle) {
 RuledPiece::RuledPiece(const PieceParams& params)
     : params_(params), surface_(make_surface(params)), warm_reach_(0) {
   if (!(params.thickness > 0)) throw std::invalid_argument("thickness_mm: must be positive");
+  if (surface_.span_count() > kMostSpans)
+    throw std::invalid_argument("knots: the curves have " + std::to_string(surface_.span_count()) +
+                                " spans; allowed are up to " + std::to_string(kMostSpans));
   const auto count = surface_.span_count() * kSamplesPerSpan;
   std::vector<Vec3> middle;
   for (std::size_t i = 0; i <= count; ++i) {
@@ -119,6 +123,8 @@ RuledPiece::Foot RuledPiece::search(const Vec3& p) const {
   best.r = Vec3::Constant(std::numeric_limits<double>::infinity());
   double v = 0, v_next = 0;
   double before = std::numeric_limits<double>::infinity(), here = at(0, v);
+  double closest = before;  // of the samples
+  Foot sampled;
   for (std::size_t i = 0; i < samples_.size(); ++i) {
     const double next =
         i + 1 < samples_.size() ? at(i + 1, v_next) : std::numeric_limits<double>::infinity();
@@ -127,10 +133,16 @@ RuledPiece::Foot RuledPiece::search(const Vec3& p) const {
       if (foot.converged && (!best.converged || foot.r.squaredNorm() < best.r.squaredNorm()))
         best = foot;
     }
+    if (here < closest) {
+      closest = here;
+      sampled = {samples_[i].u, v, samples_[i].c0 + v * samples_[i].ruling - p, true};
+    }
     before = here;
     here = next;
     v = v_next;
   }
+  // Beyond the centre of curvature the nearest part may not converge; another one is not nearest.
+  if (!(best.r.norm() <= std::sqrt(closest) + 1e-6)) return sampled;
   return best;
 }
 

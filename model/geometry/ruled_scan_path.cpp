@@ -9,7 +9,8 @@
 namespace vcnc {
 namespace {
 
-constexpr std::size_t kFineStepsPerSpan = 512;  // the arc-length table: chords of about 0.1 mm
+// The arc-length table: chords of about 0.1 mm, and bounded work for curves of many short spans.
+constexpr std::size_t kFineStepsPerSpan = 512, kFewestPerSpan = 64, kFineSteps = 32 * 512;
 constexpr std::size_t kFineStepsOfEnd = 1024;
 
 [[noreturn]] void no_path(double z, double v) {
@@ -132,7 +133,9 @@ std::vector<Station> RuledPiece::scan_path(double ball_radius, double interferen
   if (!(surface_.ruling(first).z() > 0.5 && surface_.ruling(last).z() > 0.5))
     throw std::invalid_argument("bottom_mm, top_mm: the end rulings must be within 60 deg of z");
 
-  const std::size_t fine = kFineStepsPerSpan * surface_.span_count();
+  const std::size_t spans = surface_.span_count();
+  const std::size_t fine =
+      spans * std::clamp(kFineSteps / spans, kFewestPerSpan, kFineStepsPerSpan);
   Face plus(surface_, 1, rho, z), minus(surface_, -1, rho, z);
   std::vector<Station> path{plus.at(first)};
   append(

@@ -63,8 +63,13 @@ ChannelSample SignalChannel::sample(double true_deflection) {
   ++samples_;
 
   ChannelSample result;
-  result.cos_code = adc_.code(analogue.u);
-  result.sin_code = adc_.code(analogue.w);
+  if (fault_ == ChannelFault::wire_break) analogue = {0, 0};
+  if (fault_ == ChannelFault::saturated) analogue = {Adc::kReference, Adc::kReference};
+  const bool stuck = fault_ == ChannelFault::stuck && samples_ > 1;
+  result.cos_code = stuck ? last_cos_ : adc_.code(analogue.u);
+  result.sin_code = stuck ? last_sin_ : adc_.code(analogue.w);
+  last_cos_ = result.cos_code;
+  last_sin_ = result.sin_code;
   SinCos digital{adc_.signal(result.cos_code), adc_.signal(result.sin_code)};
   double amplitude = kNominalAmplitude;
   if (correction_ == ProbeParams::Correction::heydemann) {

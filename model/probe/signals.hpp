@@ -60,6 +60,10 @@ struct ChannelSample {
   bool fault = false;     ///< amplitude out of bounds or converter at its end, now
 };
 
+/// What is broken in a channel: both signals at mid voltage, a converter that repeats its last
+/// codes, or one at its end.
+enum class ChannelFault { none, wire_break, stuck, saturated };
+
 /// One of the three channels x, y, z. Call sample() every 100 us.
 class SignalChannel {
  public:
@@ -67,6 +71,8 @@ class SignalChannel {
   SignalChannel(const ProbeParams& probe, int component, Chain<AnaloguePort> effects = {});
 
   ChannelSample sample(double true_deflection);
+
+  void suffer(ChannelFault fault) { fault_ = fault; }  ///< from now on
 
   /// For a probe known to be free: whole periods that the reading is off (0: none); flags a slip
   /// otherwise.
@@ -84,6 +90,8 @@ class SignalChannel {
   Chain<AnaloguePort> effects_;
   int component_;
   std::int64_t samples_ = 0;
+  ChannelFault fault_ = ChannelFault::none;
+  std::uint16_t last_cos_ = 0, last_sin_ = 0;  ///< codes
   OnlineCorrector corrector_;
   Unwrapper unwrapper_;
   bool check_slip_ = false;  ///< a zero check or the amplitude found a slip

@@ -78,9 +78,9 @@ TEST(Messages, GoldenBytesOfAnswers) {
                    1, 0, 2, 0, 3, 0, 4, 0, 5,    0,    0xff, 0xff, 0,    0,    0,    0}));
 
   const Frame overtravel = encode(
-      OvertravelState{258, OvertravelState::State::tripped, OvertravelState::Cause::signal, 1e-4});
+      OvertravelState{258, OvertravelState::State::hard, OvertravelState::Cause::signal, 1e-4});
   EXPECT_EQ(overtravel.id, 0x188);
-  EXPECT_EQ(bytes_of(overtravel), (Bytes{2, 1, 2, 3, 0x40, 0x42, 0x0f, 0}));
+  EXPECT_EQ(bytes_of(overtravel), (Bytes{2, 1, 3, 3, 0x40, 0x42, 0x0f, 0}));
 }
 
 // ------------------------------------------------------------------ contract of every codec
@@ -291,10 +291,10 @@ TEST(Messages, MeaninglessCodesAreRefused) {
   command.data[54] = 4;
   EXPECT_FALSE(decode_group_command(command));
   Frame overtravel = encode(OvertravelState{});
-  overtravel.data[2] = 3;
+  overtravel.data[2] = 4;
   EXPECT_FALSE(decode_overtravel_state(overtravel));
   overtravel.data[2] = 0;
-  overtravel.data[3] = 6;
+  overtravel.data[3] = 8;
   EXPECT_FALSE(decode_overtravel_state(overtravel));
 }
 

@@ -150,6 +150,8 @@ std::vector<GroupCommand> commands(const Machine& machine, const std::string& te
     for (int node = 1; node <= 6; ++node)
       answers.push_back(encode(DriveStatus{
           .node = node, .tick = low16(k + 1), .statusword = cia402::statusword_of(state)}));
+    answers.push_back(encode(ProbeSample{.tick = low16(k)}));
+    answers.push_back(encode(OvertravelState{.tick = low16(k)}));
     goes_on = nc.step(k, answers, out);
     sent.push_back(*decode_group_command(out.front()));
   }

@@ -195,7 +195,7 @@ TEST(WholeMachine, EffectsAtTheirNullValueDoNotChangeABit) {
 
 // ------------------------------------------------------------------------------ overtravel
 
-/// Drives the ball along -x far into a plane at x = 100 mm.
+/// Drives the ball along -x far into a plane at x = 100 mm; feed 0: at rapid.
 Outcome crash(double feed_mm_min) {
   PieceParams plane;
   plane.kind = PieceParams::Kind::plane;
@@ -204,27 +204,41 @@ Outcome crash(double feed_mm_min) {
   const TemporaryFile piece("plane.toml", to_toml(plane));
   Machine machine = load_machine(configs("machines/trunnion.toml"),
                                  {"setup.piece=" + piece.path(), "axes.X.start_mm=200"});
-  return play(machine, "G90 G21 G54\nM19\nG43 H1\nG0 X130 Y0 Z100\nG1 X90 F" +
-                           std::to_string(feed_mm_min) + "\nM30\n");
+  const std::string approach =
+      feed_mm_min > 0 ? "G1 X90 F" + std::to_string(feed_mm_min) : std::string("G0 X90");
+  return play(machine, "G90 G21 G54\nM19\nG43 H1\nG0 X130 Y0 Z100\n" + approach + "\nM30\n");
 }
 
-TEST(Overtravel, StopsTheAxesLocksTheSpindleAndSaysSo) {
+TEST(Overtravel, StopsSoftlyRetractsLocksTheSpindleAndSaysSo) {
   const Outcome run = crash(1000);
   EXPECT_FALSE(run.nc.end.complete);
   EXPECT_TRUE(run.nc.alarmed);
   EXPECT_EQ(run.nc.exit_code(), 3) << run.nc.end.reason;
   ASSERT_FALSE(run.summary.alarms.empty());
   EXPECT_TRUE(std::any_of(run.summary.alarms.begin(), run.summary.alarms.end(),
-                          [](const Alarm& a) { return a.code == 1001 || a.code == 1002; }));
+                          [](const Alarm& a) { return a.code == 1003 || a.code == 1004; }));
+  EXPECT_FALSE(std::any_of(run.summary.alarms.begin(), run.summary.alarms.end(),
+                           [](const Alarm& a) { return a.code == 1001 || a.code == 1002; }))
+      << "a soft stop was enough";
   EXPECT_EQ(run.rows.back().state, static_cast<double>(NcState::alarm));
 
-  // At rest well before the 18 mm of the mechanism, and within v^2/2a of the trip.
+  // At rest, off the piece, well before the 18 mm of the mechanism.
   const TelemetryRow& last = run.rows.back();
   EXPECT_NEAR(last.q_act[kX], run.rows[run.rows.size() - 50].q_act[kX], 1e-8);
   double deepest = 0;
   for (const TelemetryRow& row : run.rows) deepest = std::max(deepest, row.deflection[0]);
   EXPECT_GT(deepest, 2.0e-3);
   EXPECT_LT(deepest, 2.3e-3);
+  EXPECT_NEAR(last.deflection[0], 0, 1e-6) << "retracted";
+}
+
+TEST(Overtravel, AFeedThatCouldNotStopInTimeIsRefusedBeforeAnythingMoves) {
+  try {
+    crash(30000);
+    FAIL() << "accepted";
+  } catch (const InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("too fast for the probe"), std::string::npos) << e.what();
+  }
 }
 
 TEST(Overtravel, TheTripReachesTheDrivesWithinTwoCycles) {
@@ -244,7 +258,7 @@ TEST(Overtravel, TheTripReachesTheDrivesWithinTwoCycles) {
 TEST(Overtravel, ARapidCrashTripsToo) {
   // At rapid the ball moves faster than its periods can be counted: the reading is worthless, but
   // the machine must stop all the same. Sideways into the plane, and from above onto one.
-  const Outcome lateral = crash(30000);
+  const Outcome lateral = crash(0);
   EXPECT_EQ(lateral.nc.exit_code(), 3) << lateral.nc.end.reason;
   EXPECT_GT(lateral.rows.back().q_act[kX], 0.09 + 1e-3) << "it must not reach the programmed end";
 
@@ -284,7 +298,7 @@ TEST(Overtravel, TheNcUnitsOwnCheckStopsItWhenTheModuleIsBlind) {
   options.piece_toml = to_toml(plane);
   const NcRunResult result = run_nc(machine, options, transport, keeper);
   EXPECT_TRUE(result.alarmed);
-  EXPECT_NE(result.end.reason.find("1002"), std::string::npos) << result.end.reason;
+  EXPECT_NE(result.end.reason.find("1004"), std::string::npos) << result.end.reason;
 }
 
 }  // namespace

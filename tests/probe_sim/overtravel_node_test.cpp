@@ -30,23 +30,23 @@ class OvertravelNodeTest : public testing::Test {
   int emergencies_ = 0;
 };
 
-TEST_F(OvertravelNodeTest, WarnsAboveFourFifthsAndTripsBeyondTheRange) {
+TEST_F(OvertravelNodeTest, TellsEveryStage) {
   EXPECT_EQ(hear(0.5).state, State::normal);
-  EXPECT_EQ(hear(1.59).state, State::normal);
   EXPECT_EQ(hear(1.61).state, State::warn);
-  EXPECT_EQ(hear(1.5).state, State::normal);
-  const OvertravelState tripped = hear(2.01);
-  EXPECT_EQ(tripped.state, State::tripped);
-  EXPECT_EQ(tripped.cause, Cause::range);
-  EXPECT_NEAR(tripped.deflection, 2.01e-3, 1e-6);
+  const OvertravelState soft = hear(2.01);
+  EXPECT_EQ(soft.state, State::soft_stop);
+  EXPECT_EQ(soft.cause, Cause::range);
+  EXPECT_NEAR(soft.deflection, 2.01e-3, 1e-6);
+  EXPECT_EQ(hear(2.6).state, State::hard);
+  EXPECT_EQ(emergencies_, 2) << "one for each stage that latches";
 }
 
 TEST_F(OvertravelNodeTest, IsLatchedAndReportedOnce) {
   hear(3);
   EXPECT_EQ(emergencies_, 1);
-  for (int i = 0; i < 10; ++i) EXPECT_EQ(hear(0).state, State::tripped);
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(hear(0).state, State::hard);
   EXPECT_EQ(emergencies_, 1);
-  EXPECT_EQ(hear(3, 0, true).state, State::tripped) << "no reset while the cause lasts";
+  EXPECT_EQ(hear(3, 0, true).state, State::hard) << "no reset while the cause lasts";
   EXPECT_EQ(hear(0, 0, true).state, State::normal);
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 namespace vcnc {
 namespace {
@@ -16,7 +17,7 @@ class DriveNodeTest : public testing::Test {
                     bool command = true) {
     Frames inputs, out;
     OvertravelState guard;
-    if (tripped) guard.state = OvertravelState::State::tripped;
+    if (tripped) guard.state = OvertravelState::State::hard;
     inputs.push_back(encode(guard));
     if (command) {
       GroupCommand c;
@@ -39,6 +40,7 @@ class DriveNodeTest : public testing::Test {
   DriveNode node_;
   Tick k_ = 0;
   int emergencies_ = 0;
+  std::vector<std::uint16_t> seen_;
 };
 
 TEST_F(DriveNodeTest, ComesUpThroughTheStatesOfCia402) {
@@ -98,6 +100,85 @@ TEST_F(DriveNodeTest, StopsWhenTheOvertravelModuleFallsSilent) {
   EXPECT_EQ(cia402::state_of(decode_drive_status(out.at(0))->statusword),
             cia402::State::quick_stop);
   EXPECT_EQ(decode_emergency(out.at(1))->code, 0x8130);
+}
+
+TEST_F(DriveNodeTest, ASoftStopIsTheNcUnitsBusiness) {
+  enable();
+  Frames inputs{encode(OvertravelState{.state = OvertravelState::State::soft_stop})}, out;
+  GroupCommand c;
+  c.controlword = cia402::kEnable;
+  inputs.push_back(encode(c));
+  node_.step(k_++, inputs, out);
+  EXPECT_EQ(cia402::state_of(decode_drive_status(out.at(0))->statusword),
+            cia402::State::operation_enabled);
+}
+
+/// Emergencies of one cycle.
+std::vector<std::uint16_t> codes(const Frames& frames) {
+  std::vector<std::uint16_t> all;
+  for (const Frame& frame : frames)
+    if (const auto emergency = decode_emergency(frame)) all.push_back(emergency->code);
+  return all;
+}
+
+TEST_F(DriveNodeTest, AFollowingErrorBeyondTheWindowIsAFaultUntilReset) {
+  enable();
+  // The set-point jumps by more than the window: 1.5 x 0.5 m/s / 40 1/s + 1 mm = 19.75 mm.
+  const auto status = [&](std::uint16_t controlword, double position) {
+    Frames out;
+    GroupCommand c;
+    c.controlword = controlword;
+    c.axes[kX].position = position;
+    node_.step(k_++, Frames{encode(OvertravelState{}), encode(c)}, out);
+    for (const std::uint16_t code : codes(out)) seen_.push_back(code);
+    return cia402::state_of(decode_drive_status(out.at(0))->statusword);
+  };
+  EXPECT_EQ(status(cia402::kEnable, 0.019), cia402::State::operation_enabled);
+  status(cia402::kEnable, 0.045);
+  EXPECT_EQ(seen_, std::vector<std::uint16_t>{kFollowingErrorCode});
+  cia402::State state = cia402::State::fault_reaction;
+  for (int i = 0; i < 2000 && state != cia402::State::fault; ++i)
+    state = status(cia402::kEnable, 0.045);
+  EXPECT_EQ(state, cia402::State::fault);
+  EXPECT_EQ(seen_.size(), 1u) << "told once";
+  EXPECT_EQ(status(cia402::kShutdown, 0.045), cia402::State::fault);
+  EXPECT_EQ(status(cia402::kFaultReset, 0.045), cia402::State::switch_on_disabled);
+}
+
+TEST_F(DriveNodeTest, TheLimitSwitchStopsAndLetsBack) {
+  // Travel +-1 m, switches 5 mm outside.
+  machine_.axes[kX].limits.start = 1.0;
+  DriveNode node(kX, machine_, 1, *truth_);
+  Tick k = 0;
+  std::vector<std::uint16_t> seen;
+  const auto step = [&](std::uint16_t controlword, double position, double velocity = 0) {
+    Frames out;
+    GroupCommand c;
+    c.controlword = controlword;
+    c.axes[kX] = {position, velocity};
+    node.step(k++, Frames{encode(OvertravelState{}), encode(c)}, out);
+    for (const std::uint16_t code : codes(out)) seen.push_back(code);
+    return *decode_drive_status(out.at(0));
+  };
+  for (const std::uint16_t cw :
+       {cia402::kShutdown, cia402::kShutdown, cia402::kSwitchOn, cia402::kEnable, cia402::kEnable})
+    step(cw, 1.0);
+  double x = 1.0;
+  DriveStatus last;
+  for (int i = 0; i < 1000 && seen.empty(); ++i) last = step(cia402::kEnable, x += 2e-5, 0.02);
+  EXPECT_EQ(seen, std::vector<std::uint16_t>{kLimitSwitchError});
+  EXPECT_NEAR(last.position, 1.005, 5e-5);
+  for (int i = 0; i < 200; ++i) last = step(cia402::kEnable, x);
+  EXPECT_EQ(cia402::state_of(last.statusword), cia402::State::fault);
+  EXPECT_LT(last.position, 1.0052) << "braked at once";
+  // Reset and back: still beyond the switch, but no new fault on the way home.
+  const double rest = last.position;
+  for (const std::uint16_t cw : {cia402::kFaultReset, cia402::kShutdown, cia402::kSwitchOn,
+                                 cia402::kEnable, cia402::kEnable})
+    step(cw, rest);
+  for (int i = 1; i <= 500; ++i) last = step(cia402::kEnable, rest - 2e-5 * i, -0.02);
+  EXPECT_EQ(seen.size(), 1u);
+  EXPECT_LT(last.position, 1.0);
 }
 
 }  // namespace

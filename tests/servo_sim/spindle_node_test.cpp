@@ -15,7 +15,7 @@ class SpindleNodeTest : public testing::Test {
     c.spindle_speed = 100;
     c.flags = flags;
     OvertravelState guard;
-    if (tripped) guard.state = OvertravelState::State::tripped;
+    if (tripped) guard.state = OvertravelState::State::hard;
     const Frames inputs{encode(guard), encode(c)};
     Frames out;
     node_.step(k_++, inputs, out);

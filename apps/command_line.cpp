@@ -1,0 +1,209 @@
+#include "apps/command_line.hpp"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <iostream>
+#include <memory>
+
+#include "analysis/session.hpp"
+#include "apps/compare_command.hpp"
+#include "apps/effects_command.hpp"
+#include "apps/gallery_command.hpp"
+#include "apps/lockout_command.hpp"
+#include "apps/node_options.hpp"
+#include "apps/program_command.hpp"
+#include "apps/run_command.hpp"
+#include "bus/wire_docs.hpp"
+#include "configs/config.hpp"
+#include "controller/alarms.hpp"
+
+namespace vcnc {
+namespace {
+
+/// "free" or a factor of real time.
+double parse_pace(const std::string& text) {
+  if (text == "free") return 0;
+  std::size_t used = 0;
+  double pace = 0;
+  try {
+    pace = std::stod(text, &used);
+  } catch (const std::exception&) {
+    used = 0;
+  }
+  if (used != text.size() || !(pace >= 0.01 && pace <= 1000))
+    throw InputError("--pace " + text + ": expected free or a factor of real time, 0.01 .. 1000");
+  return pace;
+}
+
+std::uint64_t parse_seed(const std::string& text) {
+  std::uint64_t seed = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (error != std::errc() || end != text.data() + text.size())
+    throw InputError("--seed " + text + ": expected a whole number, 0 .. 18446744073709551615");
+  return seed;
+}
+
+void add_run(CLI::App& app, int& code) {
+  struct Arguments : RunOptions {
+    std::string pace_text = "free", seed_text = "1";
+    bool no_report = false;
+  };
+  const auto o = std::make_shared<Arguments>();
+  CLI::App* run = app.add_subcommand(
+      "run", "run a program on the virtual machine and measure its dynamic error");
+  run->add_option("PROGRAM", o->program, "G-code program")->required();
+  run->add_option("--machine", o->machine, "machine file (TOML)")->required();
+  run->add_option("--set", o->assignments,
+                  "override a key of the machine file, e.g. axes.Y.velocity_ff=0.9")
+      ->allow_extra_args(false);
+  run->add_option("--inject", o->injections,
+                  "an effect (X.backlash.gap_um=12; see vcnc effects) or the true value of a "
+                  "declared number (axes.Y.load_kg=550)")
+      ->allow_extra_args(false);
+  run->add_option("--fault", o->faults,
+                  "a fault, e.g. \"probe mute from_s=1.5 for_s=0.005\" (bus/fault.hpp)")
+      ->allow_extra_args(false);
+  run->add_option("--answer-timeout-s", o->answer_timeout_s,
+                  "a module that lets the NC unit wait longer is lost (default 5)")
+      ->check(CLI::Range(0.05, 3600.0));
+  run->add_option("--bus", o->bus, "hub:// (default), can://INTERFACE or inproc://");
+  run->add_option("--pace", o->pace_text, "free (default) or a factor of real time");
+  run->add_option("--seed", o->seed_text, "seed of all noise (default 1)");
+  run->add_option("--out", o->out, "folder for the results")->required();
+  run->add_flag("--in-process", o->in_process, "all modules in this process");
+  run->add_flag("--csv", o->csv, "also write every row as rows.csv");
+  run->add_flag("--no-report", o->no_report, "no report.html");
+  run->callback([o, &code] {
+    o->pace = parse_pace(o->pace_text);
+    o->seed = parse_seed(o->seed_text);
+    o->report = !o->no_report;
+    code = run_command(*o);
+  });
+}
+
+void add_analyze(CLI::App& app) {
+  struct Arguments {
+    std::string path, out;
+    bool csv = false;
+  };
+  const auto o = std::make_shared<Arguments>();
+  CLI::App* analyze_command = app.add_subcommand("analyze", "evaluate a recording again");
+  analyze_command->add_option("RUN", o->path, "recording or folder of a run")->required();
+  analyze_command->add_option("--out", o->out,
+                              "also write summary.json and report.html into this folder");
+  analyze_command->add_flag("--csv", o->csv, "with --out: also write every row as rows.csv");
+  analyze_command->callback([o] {
+    if (o->csv && o->out.empty())
+      throw InputError("--csv: needs --out FOLDER to write rows.csv into");
+    const RecordingReader recording(o->path);
+    for (const std::string& missing : recording.missing())
+      std::cerr << "vcnc: " << o->path << ": missing: " << missing << '\n';
+    const Summary summary = analyze(recording);
+    std::cout << to_text(summary);
+    if (!o->out.empty())
+      write_results(recording, summary, {.folder = o->out, .report = true, .csv = o->csv});
+  });
+}
+
+void add_effects(CLI::App& app) {
+  const auto o = std::make_shared<EffectsOptions>();
+  CLI::App* effects =
+      app.add_subcommand("effects", "what a real machine does besides: all effects there are");
+  effects->add_flag("--json", o->json, "everything about all of them, for scripts");
+  effects->add_flag("--markdown", o->markdown, "the reference page, docs/effects.md");
+  effects->add_subcommand("show", "equation, source, signature and parameters of one")
+      ->add_option("NAME", o->show, "name of an effect, e.g. backlash")
+      ->required();
+  effects->callback([o] { effects_command(*o); });
+}
+
+void add_gallery(CLI::App& app, int& code) {
+  const auto o = std::make_shared<GalleryOptions>();
+  CLI::App* gallery =
+      app.add_subcommand("gallery", "a page with a figure of what every effect looks like");
+  gallery->add_option("--out", o->out, "folder for index.html")->required();
+  gallery->add_option("--only", o->only, "only these effects, by name");
+  gallery->add_option("--machine", o->machine, "machine file; default: the ideal trunnion");
+  gallery->callback([o, &code] { code = gallery_command(*o); });
+}
+
+void add_compare(CLI::App& app, int& code) {
+  const auto o = std::make_shared<CompareOptions>();
+  CLI::App* compare = app.add_subcommand("compare", "two runs side by side");
+  compare->add_option("RUN_A", o->a, "recording or folder of a run")->required();
+  compare->add_option("RUN_B", o->b, "the run to compare it with")->required();
+  compare->add_option("--out", o->out, "also write compare.html with figures into this folder");
+  compare->callback([o, &code] { code = compare_command(*o); });
+}
+
+void add_lockout(CLI::App& app, int& code) {
+  struct Arguments : LockoutArguments {
+    std::string seed_text = "1";
+    std::uint64_t scenarios = 500;
+  };
+  const auto o = std::make_shared<Arguments>();
+  CLI::App* lockout = app.add_subcommand(
+      "lockout", "crash the probe many times and see that the overtravel protection holds");
+  CLI::Option* files = lockout->add_option("SCENARIO", o->files, "scenario files (TOML)");
+  lockout->add_option("--seed", o->seed_text, "seed of the drawn scenarios (default 1)");
+  CLI::Option* count = lockout->add_option(
+      "--scenarios", o->scenarios,
+      "drawn crashes, and as many ordinary runs (default 500; 0 where files are given)");
+  lockout->add_option("--machine", o->machines, "machine files to draw from (default: the shipped)")
+      ->allow_extra_args(false);
+  lockout->add_option("--jobs", o->jobs, "threads (default: one per processor)")
+      ->check(CLI::Range(1, 1024));
+  lockout->add_option("--only", o->only, "this run alone: crash-N, ordinary-N or a file's name");
+  lockout->add_option("--out", o->out, "with --only: folder for its recording and report");
+  lockout->add_option("--json", o->json, "write all results as JSON");
+  lockout->add_option("--junit", o->junit, "write all results as JUnit XML");
+  lockout->add_option("--html", o->html, "write a page with distributions and example trips");
+  lockout->add_flag("--list", o->list, "show the kinds and keys of scenarios");
+  lockout->callback([o, files, count, &code] {
+    o->seed = parse_seed(o->seed_text);
+    o->crashes = o->ordinary = *files && !*count ? 0 : o->scenarios;
+    code = lockout_command(*o);
+  });
+}
+
+void add_references(CLI::App& app) {
+  app.add_subcommand("alarms", "all alarms with cause and remedy, as Markdown")->callback([] {
+    std::cout << alarms_markdown();
+  });
+  app.add_subcommand("keys", "all keys of machine and piece files, as Markdown")->callback([] {
+    std::cout << "# Keys of a machine file\n\n"
+              << machine_key_reference() << "\n# Keys of a piece file\n\n"
+              << piece_key_reference();
+  });
+  app.add_subcommand("wire", "all messages on the bus, as Markdown")->callback([] {
+    std::cout << wire_table_markdown();
+  });
+  app.add_subcommand("dbc", "all messages on the bus, as a DBC file for CAN tools")->callback([] {
+    std::cout << dbc();
+  });
+}
+
+}  // namespace
+
+int command_line(int argc, char** argv) {
+  CLI::App app{"vcnc: a virtual five-axis CNC machine that behaves like a measured one"};
+  app.set_version_flag("--version", VCNC_VERSION);
+  app.require_subcommand(1);
+  int code = kExitOk;
+  add_run(app, code);
+  add_analyze(app);
+  add_gallery(app, code);
+  add_compare(app, code);
+  add_program_command(app);
+  add_effects(app);
+  add_lockout(app, code);
+  add_references(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kExitOk : kExitBadInput;
+  }
+  return code;
+}
+
+}  // namespace vcnc
