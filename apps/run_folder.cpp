@@ -14,9 +14,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array kFiles{"machine.toml",  "piece.toml",   "recording.h5", "recording.h5.partial",
-                            "summary.json",  "summary.txt",  "report.html",  "rows.csv",
-                            "program.ngc",   "scenario.toml", "notes.txt"};
+constexpr std::array kFiles{"machine.toml", "piece.toml",    "recording.h5", "recording.h5.partial",
+                            "summary.json", "summary.txt",   "report.html",  "rows.csv",
+                            "program.ngc",  "scenario.toml", "notes.txt"};
 
 /// First line of the machine file that a run leaves: the folder is ours.
 const std::string kMark = "# Written by vcnc run: the machine as it was run.\n";

@@ -33,7 +33,7 @@ class VirtualMachine {
   std::unique_ptr<TruthPort> truth_;
   std::vector<std::unique_ptr<Node>> nodes_;
   std::vector<std::unique_ptr<Node>> faulted_;  ///< null where a node has none
-  const ProbeNode* probe_ = nullptr;  ///< one of nodes_
+  const ProbeNode* probe_ = nullptr;            ///< one of nodes_
 };
 
 }  // namespace vcnc

@@ -231,8 +231,7 @@ void refuse_deep_lines(std::string_view text, const std::string& name) {
     const std::size_t first = one.find_first_not_of(" \t");
     const bool comment = first != one.npos && one[first] == '#';
     if (!comment && key_points(one) > kDeepest)
-      throw ConfigError(fmt::format("{}:{}: a key of more than {} parts",
-                                    name, line, kDeepest));
+      throw ConfigError(fmt::format("{}:{}: a key of more than {} parts", name, line, kDeepest));
     at = end + 1;
   }
 }

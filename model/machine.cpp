@@ -11,9 +11,12 @@ Machine::Machine() {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     AxisParams& axis = axes[i];
     if (!is_rotary(i)) continue;
-    axis.limits = {
-        .min = -2 * kPi, .max = 2 * kPi, .velocity = 3.5, .acceleration = 15, .jerk = 150,
-        .switch_distance = 2 * kDegree};
+    axis.limits = {.min = -2 * kPi,
+                   .max = 2 * kPi,
+                   .velocity = 3.5,
+                   .acceleration = 15,
+                   .jerk = 150,
+                   .switch_distance = 2 * kDegree};
     axis.mechanics = {
         .load = 2, .motor_inertia = 0.5, .travel_per_turn = 2 * kPi, .force_limit = 500};
   }
