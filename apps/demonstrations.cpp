@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numeric>
 #include <set>
 #include <stdexcept>
 
+#include "configs/spelling.hpp"
 #include "model/effects/chain.hpp"
+#include "model/effects/numbers.hpp"
 
 namespace vcnc {
 namespace {
@@ -164,14 +165,6 @@ const Peculiarity& peculiarity_of(std::string_view effect) {
 template <class Port, class... Ports>
 constexpr bool one_of = (std::is_same_v<Port, Ports> || ...);
 
-template <class Effect>
-Effect nominal_of(bool rotary) {
-  if constexpr (Effect::place == Place::axis)
-    return Effect::nominal(rotary);
-  else
-    return Effect::nominal();
-}
-
 /// Collects "key = value" of an effect's members.
 class SettingWriter {
  public:
@@ -310,21 +303,6 @@ Demonstration demonstrate(const Machine& machine) {
   }
   d.setting = setting_of<Effect>(rotary);
   return d;
-}
-
-std::size_t edits(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0u);
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      diagonal = above;
-    }
-  }
-  return row.back();
 }
 
 // -------------------------------------------------------------------------------------- readings
@@ -524,7 +502,8 @@ Demonstration demonstration(std::string_view effect, const Machine& machine) {
   if (found) return *std::move(found);
   std::string_view nearest;
   for (const EffectText* text : all_effect_texts())
-    if (nearest.empty() || edits(text->name, effect) < edits(nearest, effect)) nearest = text->name;
+    if (nearest.empty() || edit_distance(text->name, effect) < edit_distance(nearest, effect))
+      nearest = text->name;
   throw std::invalid_argument(
       fmt::format("{}: there is no such effect; did you mean {}?", effect, nearest));
 }

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/plot.hpp"
+#include "analysis/html.hpp"
 #include "model/safety/protection.hpp"
 
 namespace vcnc {
@@ -42,28 +42,8 @@ code { font-size: 13px; overflow-wrap: anywhere; }
 @media print { main { max-width: none; padding: 0; } body { font-size: 12px; } }
 )";
 
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '&')
-      result += "&amp;";
-    else if (c == '<')
-      result += "&lt;";
-    else if (c == '>')
-      result += "&gt;";
-    else
-      result += c;
-  }
-  return result;
-}
-
-std::string figure(const std::string& script, const std::string& caption) {
-  std::string why;
-  const auto svg = draw_svg(script, why);
-  return fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n",
-                     svg ? *svg : fmt::format("<div class=\"missing\">{}</div>", escaped(why)),
-                     caption);
-}
+using html::escaped;
+using html::figure;
 
 std::string heading(int width, int height) {
   return fmt::format(

@@ -402,6 +402,14 @@ std::string places_text(const Entry& e) {
   return joined(all, " ");
 }
 
+/// Keys and bounds in a row.
+std::string parameters_text(const Seating& seating) {
+  std::string text;
+  for (const Row& row : seating.rows)
+    text += (text.empty() ? "" : "; ") + hard(row.key + " " + bounds(row));
+  return text;
+}
+
 }  // namespace
 
 std::string effect_injection(std::string_view name) { return injection(find(name)); }
@@ -415,12 +423,13 @@ std::string effect_table() {
       if (e.text.family != family) continue;
       rows += fmt::format("  {:<22} {:<10} {}\n", e.text.name, places_text(e),
                           wrapped(e.text.brief, kWidth - kBrief, kBrief));
+      const bool alike = std::all_of(e.seatings.begin(), e.seatings.end(), [&](const Seating& s) {
+        return parameters_text(s) == parameters_text(e.seatings.front());
+      });
       for (const Seating& seating : e.seatings) {
-        std::string parameters = e.seatings.size() > 1 ? joined(seating.places, " ") + ":" : "";
-        for (const Row& row : seating.rows)
-          parameters += fmt::format("{}{}{}", parameters.empty() ? "" : " ",
-                                    hard(row.key + " " + bounds(row)),
-                                    &row == &seating.rows.back() ? "" : ";");
+        if (alike && &seating != &e.seatings.front()) break;
+        const std::string parameters =
+            (alike ? "" : joined(seating.places, " ") + ": ") + parameters_text(seating);
         rows += std::string(kBrief, ' ') + wrapped(parameters, kWidth - kBrief, kBrief) + "\n";
       }
     }
