@@ -290,7 +290,8 @@ std::string to_text(const Comparison& c) {
         in_um(max_abs(c.e_n_difference)),
         static_cast<double>(c.e_n_difference.size()) * kProfileBin * 1e3);
   text += axis_rows(c);
-  text += c.machine.empty() ? "declared machines: equal\n"
+  // What was injected is not in a recording: the analysis is not to know.
+  text += c.machine.empty() ? "declared machines: equal (injected effects are not compared)\n"
                             : key_rows("declared machines differ:", c.machine);
   text += key_rows("pieces differ:", c.piece);
   if (!c.not_comparable.empty()) text += "cannot be compared:\n";

@@ -95,7 +95,15 @@ void add_analyze(CLI::App& app) {
   analyze_command->callback([o] {
     if (o->csv && o->out.empty())
       throw InputError("--csv: needs --out FOLDER to write rows.csv into");
-    const RecordingReader recording(o->path);
+    const auto recording_of = [](const std::string& path) {
+      try {
+        return std::make_unique<RecordingReader>(path);
+      } catch (const RecordingError& e) {
+        throw InputError(e.what());
+      }
+    };
+    const auto reader = recording_of(o->path);
+    const RecordingReader& recording = *reader;
     for (const std::string& missing : recording.missing())
       std::cerr << "vcnc: " << o->path << ": missing: " << missing << '\n';
     const Summary summary = analyze(recording);
@@ -139,16 +147,19 @@ void add_compare(CLI::App& app, int& code) {
 void add_lockout(CLI::App& app, int& code) {
   struct Arguments : LockoutArguments {
     std::string seed_text = "1";
-    std::uint64_t scenarios = 500;
+    std::int64_t scenarios = 500;
   };
   const auto o = std::make_shared<Arguments>();
   CLI::App* lockout = app.add_subcommand(
       "lockout", "crash the probe many times and see that the overtravel protection holds");
   CLI::Option* files = lockout->add_option("SCENARIO", o->files, "scenario files (TOML)");
   lockout->add_option("--seed", o->seed_text, "seed of the drawn scenarios (default 1)");
-  CLI::Option* count = lockout->add_option(
-      "--scenarios", o->scenarios,
-      "drawn crashes, and as many ordinary runs (default 500; 0 where files are given)");
+  CLI::Option* count =
+      lockout
+          ->add_option(
+              "--scenarios", o->scenarios,
+              "drawn crashes, and as many ordinary runs (default 500; 0 where files are given)")
+          ->check(CLI::Range(0, 10'000'000));
   lockout->add_option("--machine", o->machines, "machine files to draw from (default: the shipped)")
       ->allow_extra_args(false);
   lockout->add_option("--jobs", o->jobs, "threads (default: one per processor)")
@@ -161,7 +172,7 @@ void add_lockout(CLI::App& app, int& code) {
   lockout->add_flag("--list", o->list, "show the kinds and keys of scenarios");
   lockout->callback([o, files, count, &code] {
     o->seed = parse_seed(o->seed_text);
-    o->crashes = o->ordinary = *files && !*count ? 0 : o->scenarios;
+    o->crashes = o->ordinary = *files && !*count ? 0 : static_cast<std::uint64_t>(o->scenarios);
     code = lockout_command(*o);
   });
 }

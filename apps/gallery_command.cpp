@@ -15,6 +15,7 @@
 #include "apps/node_options.hpp"
 #include "apps/page_folder.hpp"
 #include "apps/progress_line.hpp"
+#include "apps/stop_signal.hpp"
 #include "configs/config.hpp"
 
 namespace vcnc {
@@ -48,7 +49,7 @@ std::vector<GalleryEntry> make_entries(const std::vector<std::string_view>& name
   std::mutex mutex;
   ProgressLine progress;
   const auto work = [&] {
-    for (std::size_t i = next++; i < names.size(); i = next++) {
+    for (std::size_t i = next++; i < names.size() && !stop_requested(); i = next++) {
       try {
         entries[i] = gallery_entry(names[i], machine, draw);
       } catch (const std::exception& e) {
@@ -85,7 +86,14 @@ int gallery_command(const GalleryOptions& options) {
   std::string why;
   const bool draw = draw_svg("set terminal svg\nplot 0\n", why).has_value();
   if (!draw) std::cerr << "vcnc: gallery: " << why << " The page has numbers and texts only.\n";
+  catch_stop_signals();
   const std::vector<GalleryEntry> entries = make_entries(names, machine, draw);
+  if (stop_requested()) {
+    std::cerr << "vcnc: gallery: stopped, nothing was written\n";
+    std::error_code ignored;
+    fs::remove(folder, ignored);  // only if it is empty
+    return kExitInterrupted;
+  }
   write_whole_file(folder / "index.html", gallery_page(entries, machine, why));
   for (const GalleryEntry& entry : entries)
     std::cout << fmt::format("{:<22} {}\n", entry.demonstration.text->name,

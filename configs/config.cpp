@@ -332,6 +332,15 @@ void check_whole(const Machine& m, const std::string& name) {
   for (std::size_t i = 0; i < m.effects.laws.size(); ++i)
     if (const std::string objection = m.effects.laws[i].objection(); !objection.empty())
       throw ConfigError(fmt::format("{}: effects.law {}: {}", name, i + 1, objection));
+  std::set<std::string> deviating;
+  for (const Deviation& deviation : m.effects.deviations) {
+    const std::string where = name + ": effects.deviation";
+    if (deviation.key.empty()) throw ConfigError(where + ": key is missing");
+    if (std::isnan(deviation.value))
+      throw ConfigError(fmt::format("{}: {}: value is missing", where, deviation.key));
+    if (!deviating.insert(deviation.key).second)
+      throw ConfigError(fmt::format("{}: {} is given twice", where, deviation.key));
+  }
   if (m.effects.deviations.empty()) return;
   Machine is;
   try {
@@ -346,6 +355,29 @@ void check_whole(const Machine& m, const std::string& name) {
 
 namespace {
 
+/// Keys that are neither an effect nor a number of the machine, as far as they are recognised.
+void refuse_wrong_place(const std::string& key, const std::vector<Parameter>& known,
+                        const std::string& name) {
+  const std::string first = key.substr(0, key.find('.'));
+  for (const char* table : {"axes", "kinematics", "spindle", "bus"}) {
+    if (first != table) continue;
+    const Parameter* nearest = nullptr;
+    for (const Parameter& p : known)
+      if (!p.key.starts_with("effects.") &&
+          (nearest == nullptr || edit_distance(key, p.key) < edit_distance(key, nearest->key)))
+        nearest = &p;
+    throw ConfigError(fmt::format("{}: {} is not a number of a machine file; did you mean {}?",
+                                  name, key, nearest->key));
+  }
+  for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
+    if (first != Effect::text.name) return;
+    const std::string_view place =
+        of_axis(Effect::place) ? (fits(Effect::place, false) ? "X" : "C") : key_of(Effect::place);
+    throw ConfigError(
+        fmt::format("{}: {} needs its place before it: {}.{}", name, first, place, key));
+  });
+}
+
 /// `--inject KEY=VALUE` as what it means: a key below [effects], or a deviation of a declared
 /// number.
 void inject(toml::table& table, const std::string& injection) {
@@ -357,15 +389,24 @@ void inject(toml::table& table, const std::string& injection) {
   refuse_deep_lines(injection, name);
   Machine plain;
   const std::vector<Parameter> known = parameters(plain);
-  const bool declared_number =
-      !key.starts_with("effects.") &&
-      std::any_of(known.begin(), known.end(), [&](const Parameter& p) { return p.key == key; });
-  if (!declared_number) {
+  const auto number =
+      std::find_if(known.begin(), known.end(), [&](const Parameter& p) { return p.key == key; });
+  if (key.starts_with("effects.") || number == known.end()) {
+    refuse_wrong_place(key, known, name);
     merge(table, parse(key.starts_with("effects.") ? injection : "effects." + injection, name));
     return;
   }
-  const toml::table value = parse("value = " + injection.substr(equals + 1), name);
-  if (!value["value"].is_number()) throw ConfigError(fmt::format("{}: expected a number", name));
+  toml::table value;
+  try {
+    value = toml::parse("value = " + injection.substr(equals + 1), name);
+  } catch (const toml::parse_error&) {
+  }
+  const auto given = value["value"].value<double>();
+  if (!value["value"].is_number() || !std::isfinite(*given) || *given < number->range.min ||
+      *given > number->range.max)
+    throw ConfigError(fmt::format("{}: expected a number, {} .. {}{}{}", name, number->range.min,
+                                  number->range.max, number->unit.suffix.empty() ? "" : " ",
+                                  number->unit.suffix));
   toml::table deviation;
   deviation.insert("key", key);
   deviation.insert("value", *value["value"].value<double>());
@@ -388,7 +429,12 @@ Machine load_machine(const std::string& path, const std::vector<std::string>& as
     if (one["setup"]["piece"].node()) base = fs::current_path();
     merge(table, std::move(one));
   }
-  for (const std::string& injection : injections) inject(table, injection);
+  std::set<std::string> injected;
+  for (const std::string& injection : injections) {
+    if (!injected.insert(injection.substr(0, injection.find('='))).second)
+      throw ConfigError("--inject " + injection + ": the key is given twice");
+    inject(table, injection);
+  }
   Machine machine = read<Machine>(table);
   check_whole(machine, path);
   if (!machine.setup.piece.empty()) {

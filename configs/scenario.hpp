@@ -99,7 +99,7 @@ struct Scenario {
                  "what the machine must do; trip: soft_stop or hard; safe: refused or trip");
     visit("program", p.program, "kind program: G-code file, relative to this file");
     visit("gcode", p.gcode, "kind program: the program itself");
-    visit("faults", p.faults, "faults of modules and of the bus");
+    visit("faults", p.faults, "not possible yet, must be empty; see vcnc run --fault");
     visit("within_limit", p.within_limit,
           "the deflection must stay below the probe's mechanical limit");
     visit("reading_error_um", p.reading_error, unit::um, Range{0.01, 1000},

@@ -19,7 +19,8 @@ largest distance from the arc: R (1 - cos(|sweep|/(2 n))) <= d
 d: sagitta [m], R: radius of the arc [m])",
       .validity =
           R"(G2 and G3 only, helices too; at least three chords per turn. The corners of the polygon are
-blended with the tolerance of G64 as any other, or stay within 0.5 um under G61.)",
+blended with the tolerance of G64 as any other, or stay within 0.5 um under G61: with sagittas
+below that the blends are what is left of it.)",
       .source = "geometry; c^2/(8 R) for a chord c: Altintas, Manufacturing Automation, ch. 5",
       .signature =
           R"(Radial error between 0 and -d on circles, one wave per chord c = sqrt(8 R d), at the same places

@@ -1,6 +1,7 @@
 // The effects of one machine: every effect of the list at every place it fits, null by default.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -49,8 +50,8 @@ class AxisEffects {
 
 /// A declared parameter whose true value is another one: the machine is not as its file says.
 struct Deviation {
-  std::string key;   ///< "axes.Y.load_kg": any number of the machine outside [effects]
-  double value = 0;  ///< in the unit of the key
+  std::string key;  ///< "axes.Y.load_kg": any number of the machine outside [effects]
+  double value = std::numeric_limits<double>::quiet_NaN();  ///< in the unit of the key
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit) {

@@ -501,12 +501,15 @@ TEST(Deviation, BadOnesAreRefusedWithTheKeyAndWhatIsAllowed) {
     }
     return "no error";
   };
-  EXPECT_NE(refusal("axes.Y.load_kg=-5").find("axes.Y.load_kg: -5 is out of range, allowed"),
+  EXPECT_NE(refusal("axes.Y.load_kg=-5").find("load_kg=-5: expected a number, 0.0001 .. 100000 kg"),
             std::string::npos);
   EXPECT_NE(refusal("axes.Y.load_kg=heavy").find("--inject axes.Y.load_kg=heavy"),
             std::string::npos);
   EXPECT_NE(refusal("axes.Y.load_kg=true").find("expected a number"), std::string::npos);
-  EXPECT_NE(refusal("axes.Y.load_lb=5").find("unknown key"), std::string::npos);
+  EXPECT_NE(refusal("axes.Y.load_lb=5").find("did you mean axes.Y.load_kg?"), std::string::npos);
+  EXPECT_NE(refusal("squareness.xy_urad=5").find("geometry.squareness.xy_urad"), std::string::npos);
+  EXPECT_NE(refusal("axes.Y.load_kg=nan").find("load_kg=nan: expected a number"),
+            std::string::npos);
   EXPECT_NE(refusal("X.backlsh.gap_um=5")
                 .find("--inject X.backlsh.gap_um=5: effects.X.backlsh: unknown key; did you mean "
                       "backlash?"),

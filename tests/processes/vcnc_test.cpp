@@ -282,7 +282,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"EffectOutOfRange", "{GOOD} --inject X.backlash.gap_um=3000", 2,
                  "allowed 0 .. 2000 um"},
         BadInput{"BadDeviation", "{GOOD} --inject axes.Y.load_kg=-1", 2,
-                 "axes.Y.load_kg: -1 is out of range"},
+                 "load_kg=-1: expected a number, 0.0001 .. 100000 kg"},
         BadInput{"OutOfRange", "{GOOD} --set axes.X.kv_per_s=-4", 2, "allowed 0.1 .. 1000 per_s"},
         BadInput{"NoMachine", "{S}short.ngc --machine {S}none.toml --out {S}out", 2,
                  "none.toml: cannot be opened"},
