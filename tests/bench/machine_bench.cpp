@@ -39,7 +39,7 @@ const std::vector<std::string> kTenEffects{"X.backlash.gap_um=10",
                                            "Y.stribeck.excess_N=100",
                                            "Y.viscous.coefficient_Ns_per_m=1000",
                                            "X.pitch_periodic.amplitude_um=3",
-                                           "Z.scale_error.scale_ppm=20",
+                                           "Z.scale_error.error_ppm=20",
                                            "geometry.squareness.xy_urad=20",
                                            "probe.adc_noise.noise_mV=1"};
 
