@@ -61,9 +61,7 @@ double round_up(double x) {
   return 10 * power;
 }
 
-const char* colour_of(const GalleryFigure& f, std::size_t i) {
-  return kColours[f.same_colour ? 0 : i % kColours.size()];
-}
+const char* colour_of(std::size_t i) { return kColours[i % kColours.size()]; }
 
 /// Deviations from a circle, magnified, as they are shown of a circular test.
 std::string polar(const GalleryFigure& f) {
@@ -91,7 +89,7 @@ std::string polar(const GalleryFigure& f) {
   for (std::size_t i = 0; i < f.with.size(); ++i) {
     const std::string name = fmt::format("round{}", i);
     around(name, f.with[i]);
-    plot += ", " + line(name.c_str(), "", colour_of(f, i), 1.3);
+    plot += ", " + line(name.c_str(), "", colour_of(i), 1.3);
   }
   text += fmt::format(
       "set lmargin at screen 0.01\nset rmargin at screen 0.33\nset bmargin at screen 0.04\n"
@@ -143,7 +141,7 @@ std::string gallery_figure(const GalleryFigure& f) {
   for (std::size_t i = 0; i < f.with.size(); ++i) {
     const std::string name = fmt::format("with{}", i);
     text += data(name, thinned(f.with[i], x), f);
-    plot += ", " + line(name.c_str(), f.with[i].label.c_str(), colour_of(f, i), 1.4);
+    plot += ", " + line(name.c_str(), f.with[i].label.c_str(), colour_of(i), 1.4);
   }
   return text + plot + "\nunset multiplot\n";
 }

@@ -13,8 +13,7 @@ struct GalleryFigure {
   double x_scale = 1, y_scale = 1;  ///< from SI to the units of the labels
   std::string y_unit;               ///< alone, for the scale of the circle
   std::vector<Curve> without, with;
-  bool polar = false;        ///< also draw the deviations around a circle
-  bool same_colour = false;  ///< the passes are drawn alike
+  bool polar = false;  ///< also draw the deviations around a circle
 };
 
 std::string gallery_figure(const GalleryFigure& figure);

@@ -319,7 +319,7 @@ std::string shown(double si, const Scale& scale) {
 class Reader {
  public:
   Reader(const Demonstration& d, const std::vector<Curve>& without, const std::vector<Curve>& with)
-      : d_(d), scale_(scale_of(d)), abscissa_(abscissa_scale_of(d)) {
+      : d_(d), scale_(scale_of(d)) {
     for (std::size_t i = 0; i < std::min(with.size(), without.size()); ++i)
       off_.push_back(difference(with[i], without[i]));
   }
@@ -479,7 +479,7 @@ class Reader {
   }
 
   const Demonstration& d_;
-  Scale scale_, abscissa_;
+  Scale scale_;
   std::vector<Curve> off_;
   std::vector<Reading> result_;
 };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/figure_style.hpp"
 #include "analysis/html.hpp"
 #include "model/safety/protection.hpp"
 
@@ -23,7 +24,7 @@ h3 { font-size: 15px; font-weight: 650; margin: 26px 0 0; }
 p.lead { color: var(--soft); margin: 0 0 22px; }
 .verdict { display: flex; gap: 18px; align-items: center; border: 1px solid var(--line); border-left: 6px solid var(--c); border-radius: 6px; padding: 14px 18px; }
 .verdict b { font-size: 22px; color: var(--c); letter-spacing: 0.02em; }
-.PASS { --c: var(--pass); } .FAIL { --c: var(--fail); }
+.PASS { --c: var(--pass); } .FAIL, .INTERRUPTED { --c: var(--fail); }
 .tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 12px; margin: 16px 0 0; }
 .tile { border: 1px solid var(--line); border-radius: 6px; padding: 10px 14px; }
 .tile span { display: block; color: var(--soft); font-size: 13px; }
@@ -42,18 +43,9 @@ code { font-size: 13px; overflow-wrap: anywhere; }
 @media print { main { max-width: none; padding: 0; } body { font-size: 12px; } }
 )";
 
+using figure_style::heading;
 using html::escaped;
 using html::figure;
-
-std::string heading(int width, int height) {
-  return fmt::format(
-      "set terminal svg size {},{} dynamic enhanced font 'Helvetica,13' background '#ffffff'\n"
-      "set encoding utf8\nset border 3 lw 1 lc rgb '#5a6068'\n"
-      "set tics nomirror out scale 0.6 textcolor rgb '#333333'\n"
-      "set grid back lw 0.6 lc rgb '#e4e7eb'\n"
-      "set key top right horizontal Left reverse samplen 2 textcolor rgb '#333333'\n",
-      width, height);
-}
 
 std::string histogram(const Distribution& d, double scale, double from, double to, std::size_t bins,
                       const char* label, const char* caption) {
@@ -248,7 +240,10 @@ std::string lockout_page(const LockoutResults& r) {
       "<div class=\"verdict {0}\"><b>{0}</b><span>{1} of {2} runs as expected; {3} missed trips, "
       "{4} "
       "trips in ordinary runs</span></div>\n",
-      pass ? "PASS" : "FAIL", s.as_expected, s.runs, s.missed, s.false_trips);
+      pass            ? "PASS"
+      : r.interrupted ? "INTERRUPTED"
+                      : "FAIL",
+      s.as_expected, s.runs, s.missed, s.false_trips);
   page += "<div class=\"tiles\">\n";
   if (!s.reaction.empty())
     page += tile("reaction, worst", fmt::format("{:.3f} ms", s.reaction.max() * 1e3),

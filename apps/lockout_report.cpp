@@ -169,7 +169,7 @@ std::string lockout_text(const LockoutResults& r) {
   }
   if (told > kMostFailures)
     text += fmt::format("\nand {} more; see --json or --junit\n", told - kMostFailures);
-  text += s.as_expected == s.runs && !r.interrupted ? "\nPASS\n" : "\nFAIL\n";
+  text += s.as_expected != s.runs ? "\nFAIL\n" : r.interrupted ? "\nINTERRUPTED\n" : "\nPASS\n";
   return text;
 }
 
