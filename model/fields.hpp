@@ -61,6 +61,7 @@ inline constexpr Unit n_per_um{"N_per_um", 1e6}, n_per_mm{"N_per_mm", 1e3};
 inline constexpr Unit n_s_per_m{"Ns_per_m", 1}, nm_per_rad{"Nm_per_rad", 1};
 inline constexpr Unit nm_s_per_rad{"Nms_per_rad", 1};
 inline constexpr Unit rpm{"rpm", 2 * kPi / 60}, mbit_s{"Mbit_s", 1e6};
+inline constexpr Unit joule{"J", 1}, watt{"W", 1};
 }  // namespace unit
 
 }  // namespace vcnc

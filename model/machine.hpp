@@ -221,12 +221,37 @@ struct ProbeParams {
 struct BusParams {
   double nominal_bit_rate = 1e6;  ///< [bit/s] arbitration phase
   double data_bit_rate = 5e6;     ///< [bit/s] data phase
+  double heartbeat_time = 0.1;    ///< producer heartbeat of every module [s]; 0: none
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit) {
     visit("nominal_Mbit_s", p.nominal_bit_rate, unit::mbit_s, Range{0.125, 1},
           "arbitration bit rate");
     visit("data_Mbit_s", p.data_bit_rate, unit::mbit_s, Range{0.125, 8}, "CAN FD data bit rate");
+    visit("heartbeat_ms", p.heartbeat_time, unit::ms, Range{0, 10000},
+          "producer heartbeat of every module (1017h), 0: none");
+  }
+};
+
+/// Mains and the uninterruptible supply of NC unit, modules and drives (model/safety/supply.hpp).
+struct SupplyParams {
+  double hold_up_energy = 1500;    ///< [J] that a charged store can give
+  double electronics_power = 150;  ///< [W] NC unit, probe, overtravel module, drive electronics
+  double drive_power = 20;         ///< [W] of each drive that holds its axis
+  double efficiency = 0.85;        ///< from the store to the motion
+  double signal_delay = 5e-3;      ///< from the loss of the mains to the power-fail signal [s]
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    visit("hold_up_energy_J", p.hold_up_energy, unit::joule, Range{0, 1e6},
+          "energy of the uninterruptible supply, 0: there is none");
+    visit("electronics_W", p.electronics_power, unit::watt, Range{1, 1e5},
+          "what NC unit and modules take");
+    visit("drive_W", p.drive_power, unit::watt, Range{0, 1e5},
+          "what each drive takes to hold its axis");
+    visit("efficiency", p.efficiency, unit::none, Range{0.1, 1}, "from the store to the motion");
+    visit("signal_ms", p.signal_delay, unit::ms, Range{0, 1000},
+          "from the loss of the mains to the power-fail signal");
   }
 };
 
@@ -285,6 +310,7 @@ struct Machine {
   SpindleParams spindle;
   ProbeParams probe;
   BusParams bus;
+  SupplyParams supply;
   NcParams nc;
   SetupParams setup;
   Effects effects;
@@ -305,6 +331,7 @@ struct Machine {
     visit.group("spindle", p.spindle, "spindle drive");
     visit.group("probe", p.probe, "scanning probe and acquisition module");
     visit.group("bus", p.bus, "field bus");
+    visit.group("supply", p.supply, "mains and uninterruptible supply");
     visit.group("nc", p.nc, "NC unit");
     visit.group("setup", p.setup, "workpiece, offsets, evaluation");
     visit.group("effects", p.effects, "what a real machine does besides");
