@@ -18,7 +18,8 @@ Contact contact_of(const TelemetryRow& row, double depth, double min_deflection)
   if (has(row, ProbeSample::kSlip) || has(row, ProbeSample::kSignalFault) ||
       has(row, ProbeSample::kOvertravel) ||
       static_cast<int>(row.overtravel) >= static_cast<int>(OvertravelState::State::soft_stop) ||
-      static_cast<int>(row.state) == static_cast<int>(NcState::alarm))
+      static_cast<int>(row.state) == static_cast<int>(NcState::alarm) ||
+      static_cast<int>(row.state) == static_cast<int>(NcState::hold))
     return Contact::invalid;
   if (has(row, ProbeSample::kOutOfRange)) return Contact::out_of_range;
   return depth < min_deflection ? Contact::no_contact : Contact::ok;

@@ -56,7 +56,7 @@ EvaluatedRow Evaluation::row(const TelemetryRow& row) {
   if (state == NcState::running || state == NcState::dwell || state == NcState::hold)
     for (std::size_t j = 0; j < kAxisCount; ++j)
       following_[j].add(result.error.following[j], seconds(tick));
-  if (!tracker_) return result;
+  if (!tracker_ || state == NcState::hold) return result;  // held: it comes back to where it was
   result.place = tracker_->track(result.error);
   if (tracker_->line() != nullptr && coverage_.size() == 0) start_line();
   on_path(result);
@@ -137,9 +137,11 @@ void Evaluation::watch_tolerance(const EvaluatedRow& row, double step) {
     return;
   }
   if (over_samples_ > 0) over_arc_ += std::abs(step);
+  const ToleranceFailure here{row.place.s, row.error.e_n};
+  if (over_samples_ == 0 || here.worse_than(over_worst_)) over_worst_ = here;
   ++over_samples_;
   if (over_samples_ < kFailSamples || over_arc_ < kFailArc) return;
-  if (!lap_.failure) lap_.failure = ToleranceFailure{row.place.s, row.error.e_n};
+  if (!lap_.failure || over_worst_.worse_than(*lap_.failure)) lap_.failure = over_worst_;
 }
 
 void Evaluation::collect_circle(const EvaluatedRow& row) {
@@ -232,9 +234,8 @@ void Evaluation::judge(Summary& s, const std::optional<ToleranceFailure>& failur
   if (failure) {
     s.verdict = Verdict::fail;
     s.verdict_reason = fmt::format(
-        "e_n = {:+.1f} um at s = {:.1f} mm exceeds the tolerance of {:.1f} um on at least {} "
-        "samples "
-        "and {:.1f} mm of the path",
+        "e_n = {:+.1f} um at s = {:.1f} mm, at its worst, exceeds the tolerance of {:.1f} um on at "
+        "least {} samples and {:.1f} mm of the path",
         failure->e_n * 1e6, failure->s * 1e3, tolerance_um, kFailSamples, kFailArc * 1e3);
   } else if (!piece_) {
     s.verdict_reason = "the run has no workpiece";

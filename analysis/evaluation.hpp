@@ -99,6 +99,7 @@ class Evaluation {
 
   int over_samples_ = 0;
   double over_arc_ = 0;
+  ToleranceFailure over_worst_;  ///< of these samples
 
   Vec3 circle_x_ = Vec3::UnitX(), circle_y_ = Vec3::UnitY();
   double last_phi_ = 0;

@@ -67,7 +67,7 @@ void PathStatistics::merge(const PathStatistics& later) {
       circle[d][i].count += later.circle[d][i].count;
     }
   }
-  if (!failure) failure = later.failure;
+  if (!failure || (later.failure && later.failure->worse_than(*failure))) failure = later.failure;
 }
 
 }  // namespace vcnc

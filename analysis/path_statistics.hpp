@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -19,9 +20,12 @@ struct AngleBin {
   std::uint32_t count = 0;
 };
 
-/// Where the tolerance was exceeded for the first time.
+/// Where the tolerance was exceeded most on samples that count for the verdict.
 struct ToleranceFailure {
   double s = 0, e_n = 0;  ///< [m]
+  bool worse_than(const ToleranceFailure& other) const {
+    return std::abs(e_n) > std::abs(other.e_n);
+  }
 };
 
 struct PathStatistics {

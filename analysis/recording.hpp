@@ -22,6 +22,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <vector>
@@ -48,6 +49,7 @@ class RecordingWriter {
   void finish(const RunEnd& end);
 
  private:
+  void create(const std::filesystem::path& path, const RunBegin& begin);
   struct File;
   void write_block();
 
@@ -76,6 +78,8 @@ class RecordingReader {
   struct File;
   void open();
   void try_in_child();
+  bool last_block_reads() const;
+  std::optional<std::vector<TelemetryRow>> read_block(std::uint64_t at, std::uint64_t rows) const;
 
   std::filesystem::path path_;
   std::unique_ptr<File> file_;

@@ -175,26 +175,37 @@ void RecordingReader::open() {
     end_ = *end;
   } else {
     need(false, "end of the run");
+    while (rows_ > 0 && !last_block_reads()) rows_ = (rows_ - 1) / kBlockRows * kBlockRows;
     end_.cycles = static_cast<std::int64_t>(rows_);
   }
 }
 
 RecordingReader::~RecordingReader() = default;
 
+/// A writer that was killed may have announced a block and not written it.
+bool RecordingReader::last_block_reads() const {
+  const hsize_t at = (rows_ - 1) / kBlockRows * kBlockRows;
+  return read_block(at, rows_ - at).has_value();
+}
+
+/// Nothing where the file does not hold them.
+std::optional<std::vector<TelemetryRow>> RecordingReader::read_block(std::uint64_t at,
+                                                                     std::uint64_t rows) const {
+  const Quiet quiet;
+  std::vector<TelemetryRow> block(rows);
+  const std::array<hsize_t, 2> start{at, 0}, count{rows, kRowWidth};
+  const Handle space(H5Dget_space(file_->rows)), memory(H5Screate_simple(2, count.data(), nullptr));
+  H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
+  if (H5Dread(file_->rows, H5T_NATIVE_DOUBLE, memory, space, H5P_DEFAULT, block.data()) < 0)
+    return std::nullopt;
+  return block;
+}
+
 void RecordingReader::for_each(const std::function<void(const TelemetryRow&)>& f) const {
-  std::vector<TelemetryRow> block(kBlockRows);
-  const Handle space(H5Dget_space(file_->rows));
-  for (hsize_t at = 0; at < rows_; at += kBlockRows) {
-    const std::array<hsize_t, 2> start{at, 0},
-        count{std::min<hsize_t>(kBlockRows, rows_ - at), kRowWidth};
-    {
-      const Quiet quiet;
-      const Handle memory(H5Screate_simple(2, count.data(), nullptr));
-      H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
-      if (H5Dread(file_->rows, H5T_NATIVE_DOUBLE, memory, space, H5P_DEFAULT, block.data()) < 0)
-        fail(path_, "rows cannot be read");
-    }
-    for (hsize_t i = 0; i < count[0]; ++i) f(block[i]);
+  for (std::uint64_t at = 0; at < rows_; at += kBlockRows) {
+    const auto block = read_block(at, std::min<std::uint64_t>(kBlockRows, rows_ - at));
+    if (!block) fail(path_, "rows cannot be read");
+    for (const TelemetryRow& row : *block) f(row);
   }
 }
 

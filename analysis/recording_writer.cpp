@@ -37,6 +37,16 @@ void RecordingWriter::File::reserve(hsize_t bytes) {
 
 RecordingWriter::RecordingWriter(const std::filesystem::path& path, const RunBegin& begin)
     : file_(std::make_unique<File>()) {
+  try {
+    create(path, begin);
+  } catch (const RecordingError&) {
+    std::error_code ignored;
+    std::filesystem::remove(partial(path), ignored);  // it would not open
+    throw;
+  }
+}
+
+void RecordingWriter::create(const std::filesystem::path& path, const RunBegin& begin) {
   static_assert(sizeof(TelemetryRow) == kRowWidth * sizeof(double));
   const Quiet quiet;
   File& f = *file_;

@@ -73,7 +73,10 @@ Summary analyze(const RecordingReader& recording) {
   Evaluation evaluation(recording.begin());
   recording.for_each([&](const TelemetryRow& row) { evaluation.row(row); });
   for (const Alarm& alarm : recording.alarms()) evaluation.alarm(alarm);
-  return evaluation.finish(recording.end());
+  Summary summary = evaluation.finish(recording.end());
+  for (const std::string& part : recording.missing())
+    summary.warnings.push_back("missing in the recording: " + part);
+  return summary;
 }
 
 void write_results(const RecordingReader& recording, const Summary& summary,

@@ -6,13 +6,19 @@
 #include <memory>
 
 #include "analysis/session.hpp"
+#include "apps/check_command.hpp"
 #include "apps/compare_command.hpp"
 #include "apps/effects_command.hpp"
 #include "apps/gallery_command.hpp"
+#include "apps/interpret_command.hpp"
 #include "apps/lockout_command.hpp"
+#include "apps/memory_command.hpp"
 #include "apps/node_options.hpp"
+#include "apps/objects_command.hpp"
+#include "apps/plan_command.hpp"
 #include "apps/program_command.hpp"
 #include "apps/run_command.hpp"
+#include "bus/fault_docs.hpp"
 #include "bus/wire_docs.hpp"
 #include "configs/config.hpp"
 #include "controller/alarms.hpp"
@@ -61,8 +67,11 @@ void add_run(CLI::App& app, int& code) {
                   "declared number (axes.Y.load_kg=550)")
       ->allow_extra_args(false);
   run->add_option("--fault", o->faults,
-                  "a fault, e.g. \"probe mute from_s=1.5 for_s=0.005\" (bus/fault.hpp)")
+                  "a fault, e.g. \"probe mute from_s=1.5 for_s=0.005\" (see vcnc faults)")
       ->allow_extra_args(false);
+  run->add_option("--random-faults", o->random_faults,
+                  "so many faults of the simulation, drawn from --seed over the program's time")
+      ->check(CLI::Range(0, 1000));
   run->add_option("--answer-timeout-s", o->answer_timeout_s,
                   "a module that lets the NC unit wait longer is lost (default 5)")
       ->check(CLI::Range(0.05, 3600.0));
@@ -70,6 +79,12 @@ void add_run(CLI::App& app, int& code) {
   run->add_option("--pace", o->pace_text, "free (default) or a factor of real time");
   run->add_option("--seed", o->seed_text, "seed of all noise (default 1)");
   run->add_option("--out", o->out, "folder for the results")->required();
+  run->add_option("--memory", o->memory,
+                  "folder of what the machine keeps while it is off: latches, interrupted program");
+  run->add_option("--on-power-return", o->on_power_return,
+                  "when the mains return after a loss: end (default) or resume")
+      ->check(CLI::IsMember({"end", "resume"}));
+  run->add_flag("--resume", o->resume, "go on with the program that --memory says was interrupted");
   run->add_flag("--in-process", o->in_process, "all modules in this process");
   run->add_flag("--csv", o->csv, "also write every row as rows.csv");
   run->add_flag("--no-report", o->no_report, "no report.html");
@@ -79,6 +94,30 @@ void add_run(CLI::App& app, int& code) {
     o->report = !o->no_report;
     code = run_command(*o);
   });
+}
+
+void add_memory(CLI::App& app) {
+  const auto folder = std::make_shared<std::string>();
+  CLI::App* memory =
+      app.add_subcommand("memory", "what a machine keeps while it is off (vcnc run --memory)");
+  memory->add_option("DIR", *folder, "folder given as --memory")->required();
+  memory->callback([folder] { memory_command(*folder); });
+  CLI::App* reset = app.add_subcommand(
+      "reset", "the operator's reset: open every latch, drop an interrupted program");
+  reset->add_option("DIR", *folder, "folder given as --memory")->required();
+  reset->callback([folder] { reset_command(*folder); });
+}
+
+void add_plan(CLI::App& app) {
+  const auto o = std::make_shared<PlanOptions>();
+  CLI::App* plan = app.add_subcommand(
+      "plan", "what the NC unit will command for a program, and how close to the limits it gets");
+  plan->add_option("PROGRAM", o->program, "G-code program")->required();
+  plan->add_option("--machine", o->machine, "machine file (TOML)")->required();
+  plan->add_option("--set", o->assignments, "override a key of the machine file")
+      ->allow_extra_args(false);
+  plan->add_option("--csv", o->csv, "write every cycle: time, axes, tip, feed, program line");
+  plan->callback([o] { plan_command(*o); });
 }
 
 void add_analyze(CLI::App& app) {
@@ -141,6 +180,8 @@ void add_compare(CLI::App& app, int& code) {
   compare->add_option("RUN_A", o->a, "recording or folder of a run")->required();
   compare->add_option("RUN_B", o->b, "the run to compare it with")->required();
   compare->add_option("--out", o->out, "also write compare.html with figures into this folder");
+  compare->add_flag("--reveal", o->reveal,
+                    "also tell which effects, keys and faults of the two runs differ");
   compare->callback([o, &code] { code = compare_command(*o); });
 }
 
@@ -158,23 +199,59 @@ void add_lockout(CLI::App& app, int& code) {
       lockout
           ->add_option(
               "--scenarios", o->scenarios,
-              "drawn crashes, and as many ordinary runs (default 500; 0 where files are given)")
+              "drawn crashes, as many ordinary runs, and as many crashes with a fault besides "
+              "(default 500; 0 where files are given)")
           ->check(CLI::Range(0, 10'000'000));
+  CLI::Option* processes =
+      lockout
+          ->add_option("--processes", o->processes,
+                       "runs on real processes, one of which is killed, stopped or restarted "
+                       "(default 0; without --scenarios these alone)")
+          ->check(CLI::Range(0, 1'000'000));
   lockout->add_option("--machine", o->machines, "machine files to draw from (default: the shipped)")
       ->allow_extra_args(false);
   lockout->add_option("--jobs", o->jobs, "threads (default: one per processor)")
       ->check(CLI::Range(1, 1024));
-  lockout->add_option("--only", o->only, "this run alone: crash-N, ordinary-N or a file's name");
+  lockout->add_option("--only", o->only,
+                      "this run alone: crash-N, ordinary-N, faulted-N, process-N or a file's name");
   lockout->add_option("--out", o->out, "with --only: folder for its recording and report");
   lockout->add_option("--json", o->json, "write all results as JSON");
   lockout->add_option("--junit", o->junit, "write all results as JUnit XML");
   lockout->add_option("--html", o->html, "write a page with distributions and example trips");
   lockout->add_flag("--list", o->list, "show the kinds and keys of scenarios");
-  lockout->callback([o, files, count, &code] {
+  lockout->callback([o, files, count, processes, &code] {
     o->seed = parse_seed(o->seed_text);
-    o->crashes = o->ordinary = *files && !*count ? 0 : static_cast<std::uint64_t>(o->scenarios);
+    o->crashes = o->ordinary = o->faulted =
+        (*files || *processes) && !*count ? 0 : static_cast<std::uint64_t>(o->scenarios);
     code = lockout_command(*o);
   });
+}
+
+void add_interpret(CLI::App& app, int& code) {
+  const auto o = std::make_shared<InterpretOptions>();
+  CLI::App* interpret = app.add_subcommand("interpret", "the path a program describes, as JSON");
+  interpret->add_option("PROGRAM", o->program, "G-code program")->required();
+  interpret->add_option("--json", o->json, "file to write (default: the terminal)");
+  interpret->add_option("--machine", o->machine, "machine file; without it: no machine at all");
+  interpret->add_option("--set", o->assignments, "override a key of the machine file")
+      ->allow_extra_args(false);
+  interpret->add_option("--tools", o->tools, "tool table of LinuxCNC, instead of the machine's");
+  interpret->add_option("--tools-unit", o->tools_unit, "unit of its numbers: mm (default) or inch")
+      ->check(CLI::IsMember({"mm", "inch"}));
+  interpret->add_option("--dialect", o->dialect, "auto (default), ngc, fanuc or siemens")
+      ->check(CLI::IsMember({"auto", "ngc", "fanuc", "siemens"}));
+  interpret->add_flag("--block-delete", o->block_delete, "skip lines that begin with /");
+  interpret->callback([o, &code] { code = interpret_command(*o); });
+}
+
+void add_check(CLI::App& app) {
+  const auto o = std::make_shared<CheckOptions>();
+  CLI::App* check = app.add_subcommand("check", "can the machine run these programs?");
+  check->add_option("PROGRAM", o->programs, "G-code programs")->required();
+  check->add_option("--machine", o->machine, "machine file; default: only the language is checked");
+  check->add_option("--set", o->assignments, "override a key of the machine file")
+      ->allow_extra_args(false);
+  check->callback([o] { check_command(*o); });
 }
 
 void add_references(CLI::App& app) {
@@ -186,12 +263,34 @@ void add_references(CLI::App& app) {
               << machine_key_reference() << "\n# Keys of a piece file\n\n"
               << piece_key_reference();
   });
+  app.add_subcommand("faults", "all kinds of faults and how they are written, as Markdown")
+      ->callback([] { std::cout << faults_markdown(); });
   app.add_subcommand("wire", "all messages on the bus, as Markdown")->callback([] {
     std::cout << wire_table_markdown();
   });
+  app.add_subcommand("objects", "the CANopen object dictionaries of the modules, as Markdown")
+      ->callback([] { std::cout << objects_page(); });
+  struct Arguments {
+    std::string node, machine;
+  };
+  const auto o = std::make_shared<Arguments>();
+  CLI::App* eds = app.add_subcommand("eds", "the electronic data sheet of a module (CiA 306)");
+  eds->add_option("NODE", o->node, "\"drive X\", probe, ... or its node id")->required();
+  eds->add_option("--machine", o->machine, "machine file; default: one without entries");
+  eds->callback([o] { std::cout << data_sheet(o->node, o->machine); });
   app.add_subcommand("dbc", "all messages on the bus, as a DBC file for CAN tools")->callback([] {
     std::cout << dbc();
   });
+}
+
+/// A value that is there but empty (--out "") is a slip, most often of a shell variable.
+void refuse_empty_values(CLI::App& app) {
+  const auto not_empty = [](const std::string& value) {
+    return value.empty() ? std::string("needs a value, \"\" is none") : std::string();
+  };
+  for (CLI::Option* option : app.get_options())
+    if (option->get_items_expected_max() > 0) option->check(not_empty);
+  for (CLI::App* sub : app.get_subcommands({})) refuse_empty_values(*sub);
 }
 
 }  // namespace
@@ -202,13 +301,18 @@ int command_line(int argc, char** argv) {
   app.require_subcommand(1);
   int code = kExitOk;
   add_run(app, code);
+  add_memory(app);
+  add_plan(app);
   add_analyze(app);
   add_gallery(app, code);
   add_compare(app, code);
   add_program_command(app);
+  add_interpret(app, code);
+  add_check(app);
   add_effects(app);
   add_lockout(app, code);
   add_references(app);
+  refuse_empty_values(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

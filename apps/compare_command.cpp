@@ -1,6 +1,7 @@
 #include "apps/compare_command.hpp"
 
 #include <iostream>
+#include <utility>
 
 #include "analysis/compare.hpp"
 #include "analysis/compare_page.hpp"
@@ -8,6 +9,8 @@
 #include "analysis/whole_file.hpp"
 #include "apps/node_options.hpp"
 #include "apps/page_folder.hpp"
+#include "apps/reveal.hpp"
+#include "apps/stop_signal.hpp"
 #include "model/input_error.hpp"
 
 namespace vcnc {
@@ -21,14 +24,26 @@ ComparedRun read(const char* option, const std::string& path) {
   }
 }
 
+int interrupted() {
+  std::cerr << "vcnc: compare: stopped, nothing was written\n";
+  return kExitInterrupted;
+}
+
 }  // namespace
 
 int compare_command(const CompareOptions& options) {
   const std::string name = "compare.html";
-  const Comparison comparison = compare(read("RUN_A", options.a), read("RUN_B", options.b));
+  catch_stop_signals();
+  ComparedRun a = read("RUN_A", options.a);
+  if (stop_requested()) return interrupted();
+  ComparedRun b = read("RUN_B", options.b);
+  if (stop_requested()) return interrupted();
+  const Comparison comparison = compare(std::move(a), std::move(b));
+  if (stop_requested()) return interrupted();
   std::filesystem::path file;
   if (!options.out.empty()) file = page_folder(options.out, name, kCompareMark) / name;
-  std::cout << to_text(comparison);
+  const std::string truth = options.reveal ? reveal(options.a, options.b) : "";
+  std::cout << to_text(comparison) << truth;
   if (!file.empty()) {
     write_whole_file(file, compare_page(comparison));
     std::cout << "comparison: " << file.string() << '\n';

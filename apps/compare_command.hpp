@@ -6,8 +6,9 @@
 namespace vcnc {
 
 struct CompareOptions {
-  std::string a, b;  ///< recordings or folders of runs
-  std::string out;   ///< folder for compare.html; empty: none
+  std::string a, b;     ///< recordings or folders of runs
+  bool reveal = false;  ///< also what the runs truly were
+  std::string out;      ///< folder for compare.html; empty: none
 };
 
 /// Exit code of the program. Throws InputError where there is nothing to compare.

@@ -1,5 +1,5 @@
-// The lines of text a process sends to the one that launched it: "ready", then "progress ..." and,
-// for people and to be kept, "note ...".
+// The lines of text a process sends to the one that launched it: "ready", then "progress ...",
+// for people and to be kept "note ...", and "struck ..." for a fault that has had an effect.
 #pragma once
 
 #include <string>
@@ -14,6 +14,7 @@ class ControlPipe {
 
   void ready() const { line("ready"); }
   void progress(std::string_view text) const { line(std::string("progress ") + std::string(text)); }
+  void struck(std::string_view fault) const { line(std::string("struck ") + std::string(fault)); }
   void note(std::string_view text) const { line(std::string("note ") + std::string(text)); }
 
  private:

@@ -1,7 +1,10 @@
 // vcnc-drive: one servo drive (X Y Z A C) or the spindle drive.
 #include <algorithm>
+#include <string>
 
+#include "apps/memory_folder.hpp"
 #include "apps/serve.hpp"
+#include "apps/switch_on.hpp"
 #include "bus/truth.hpp"
 #include "configs/config.hpp"
 #include "servo_sim/drive_node.hpp"
@@ -12,11 +15,14 @@ namespace {
 int drive(int argc, char** argv) {
   using namespace vcnc;
   const NodeOptions options =
-      parse_node_options(argc, argv, "A servo or spindle drive on the bus", "mbtas");
-  const Machine machine = load_machine(options.machine);
+      parse_node_options(argc, argv, "A servo or spindle drive on the bus", "mbtaskw");
+  const Machine machine = switched_on_at(load_machine(options.machine), options.switched_on_at);
   if (options.axis == "spindle") {
-    SpindleNode node(machine);
-    return serve(node, options);
+    SlotFiles memory(options.memory, "spindle");
+    SpindleNode node(machine, options.memory.empty() ? nullptr : &memory);
+    return serve(node, options, [&] {
+      return std::string(node.locked() ? "the spindle is locked" : "the spindle is not locked");
+    });
   }
   const auto axis =
       std::find(kAxisNames.begin(), kAxisNames.end(), options.axis) - kAxisNames.begin();

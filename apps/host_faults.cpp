@@ -1,5 +1,6 @@
 #include "apps/host_faults.hpp"
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 
@@ -11,7 +12,8 @@ constexpr double kSlowPeriod = 0.02;  ///< stopped so long, running so long [s]
 
 }  // namespace
 
-HostFaults::HostFaults(const BusFaults& faults) {
+HostFaults::HostFaults(const BusFaults& faults, std::filesystem::path folder)
+    : folder_(std::move(folder)) {
   for (const BusFault& fault : faults)
     if (fault.of_host()) faults_.push_back({fault});
 }
@@ -23,7 +25,22 @@ void HostFaults::note(const std::string& progress) {
 
 void HostFaults::act(Launcher& launcher) {
   for (Armed& armed : faults_)
-    if (!armed.over) act(armed, launcher);
+    if (!armed.over && (armed.begun || launcher.running(armed.fault.node))) act(armed, launcher);
+}
+
+std::vector<std::string> HostFaults::not_begun() const {
+  std::vector<std::string> texts;
+  for (const Armed& armed : faults_)
+    if (!armed.begun) texts.push_back(armed.fault.text);
+  return texts;
+}
+
+std::uintmax_t HostFaults::largest_file() const {
+  std::uintmax_t largest = 0;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_, error))
+    if (entry.is_regular_file(error)) largest = std::max(largest, entry.file_size(error));
+  return largest;
 }
 
 void HostFaults::act(Armed& armed, Launcher& launcher) {
@@ -33,14 +50,20 @@ void HostFaults::act(Armed& armed, Launcher& launcher) {
   if (!armed.begun) {
     if (now < (fault.wall_s >= 0 ? fault.wall_s : seconds(fault.from))) return;
     armed.begun = true;
-    armed.since = now;
-    if (fault.kind == BusFault::Kind::kill) {
-      launcher.signal(fault.node, SIGKILL);
-      armed.over = true;
-      return;
+    armed.since = host;
+    armed.over = true;
+    switch (fault.kind) {
+      case BusFault::Kind::kill:
+        return launcher.signal(fault.node, SIGKILL);
+      case BusFault::Kind::restart:
+        return launcher.restart(fault.node);
+      case BusFault::Kind::disk_full:
+        return launcher.limit_files(fault.node, largest_file());
+      default:
+        break;
     }
   }
-  armed.over = fault.cycles > 0 && now - armed.since >= seconds(fault.cycles);
+  armed.over = fault.cycles > 0 && host - armed.since >= seconds(fault.cycles);
   const bool toggle = fault.kind == BusFault::Kind::slow && host - armed.toggled_at >= kSlowPeriod;
   const bool stop = !armed.over &&
                     (toggle ? !armed.stopped : fault.kind == BusFault::Kind::stop || armed.stopped);

@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -13,6 +14,7 @@
 #include <csignal>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 
 namespace vcnc {
 
@@ -43,7 +45,7 @@ std::string program_directory() {
 void Launcher::start(const std::string& name, std::vector<std::string> argv) {
   int pipe_ends[2];
   if (::pipe2(pipe_ends, O_CLOEXEC) != 0) throw LaunchError(system_error(name + ": pipe"));
-  Child child{.name = name, .control = pipe_ends[0]};
+  Child child{.name = name, .control = pipe_ends[0], .argv = argv};
   child.words = ::memfd_create(name.c_str(), MFD_CLOEXEC);
   if (child.words < 0) throw LaunchError(system_error(name + ": memory file"));
   argv.push_back("--control-fd");
@@ -66,6 +68,7 @@ void Launcher::start(const std::string& name, std::vector<std::string> argv) {
     ::setpgid(0, 0);  // Ctrl-C goes to the launcher, which ends the run in order
     ::signal(SIGINT, SIG_DFL);
     ::signal(SIGTERM, SIG_DFL);
+    ::signal(SIGXFSZ, SIG_IGN);  // a file at its limit is an error of write, as a full disk is
     ::sigprocmask(SIG_SETMASK, &before, nullptr);
     ::fcntl(pipe_ends[1], F_SETFD, 0);
     ::dup2(child.words, STDERR_FILENO);
@@ -89,6 +92,7 @@ bool Launcher::read_lines(Child& child, const OnProgress& on_progress) {
     child.partial_line.erase(0, end + 1);
     if (line == "ready") child.ready = true;
     if (line.starts_with("note ")) child.notes.push_back(line.substr(5));
+    if (line.starts_with("struck ")) child.struck.push_back(line.substr(7));
     if (line.starts_with("progress ") && on_progress) on_progress(line.substr(9));
   }
   return true;
@@ -100,7 +104,10 @@ Exited Launcher::reap(std::size_t index) {
   int status = 0;
   while (::waitpid(child.pid, &status, 0) < 0 && errno == EINTR) {
   }
-  Exited exited{.name = child.name, .last_words = read_words(child.words), .notes = child.notes};
+  Exited exited{.name = child.name,
+                .last_words = read_words(child.words),
+                .notes = child.notes,
+                .struck = child.struck};
   if (WIFSIGNALED(status)) {
     exited.code = 128 + WTERMSIG(status);
     exited.how =
@@ -111,6 +118,10 @@ Exited Launcher::reap(std::size_t index) {
   }
   ::close(child.control);
   ::close(child.words);
+  if (child.again) {
+    exited.how += ", started again";
+    start(child.name, child.argv);
+  }
   return exited;
 }
 
@@ -123,9 +134,10 @@ std::optional<Exited> Launcher::next(int timeout_ms, const OnProgress& on_progre
   return std::nullopt;
 }
 
-void Launcher::wait_all_ready(int timeout_ms) {
-  constexpr int kStep = 50;
-  for (int waited = 0;; waited += kStep) {
+void Launcher::wait_all_ready(int timeout_ms, const std::function<void()>& meanwhile) {
+  const int step = meanwhile ? 5 : 50;
+  for (int waited = 0;; waited += step) {
+    if (meanwhile) meanwhile();
     // A burst of messages ends a step early, so the time-out is a lower bound on the patience.
     while (auto exited = next(0, nullptr)) throw LaunchError(exited->sentence());
     const auto silent =
@@ -134,13 +146,43 @@ void Launcher::wait_all_ready(int timeout_ms) {
     if (waited >= timeout_ms)
       throw LaunchError(
           fmt::format("{}: not ready after {:.0f} s", silent->name, timeout_ms / 1000.0));
-    if (auto exited = next(kStep, nullptr)) throw LaunchError(exited->sentence());
+    if (auto exited = next(step, nullptr)) throw LaunchError(exited->sentence());
   }
 }
 
 void Launcher::signal(const std::string& name, int signal_number) {
   for (const Child& child : children_)
     if (child.name == name) ::kill(child.pid, signal_number);
+}
+
+void Launcher::restart(const std::string& name) {
+  for (Child& child : children_)
+    if (child.name == name) child.again = true;
+  signal(name, SIGKILL);
+}
+
+void Launcher::limit_files(const std::string& name, std::uintmax_t bytes) {
+  const rlimit limit{bytes, bytes};
+  for (const Child& child : children_)
+    if (child.name == name) ::prlimit(child.pid, RLIMIT_FSIZE, &limit, nullptr);
+}
+
+bool Launcher::stopped(const Child& child) {
+  std::ifstream in(fmt::format("/proc/{}/stat", child.pid));
+  std::string stat;
+  std::getline(in, stat);
+  const std::size_t state = stat.rfind(") ");  // after the name, which may hold anything
+  return state != std::string::npos && stat[state + 2] == 'T';
+}
+
+bool Launcher::stopped(const std::string& name) const {
+  return std::any_of(children_.begin(), children_.end(),
+                     [&](const Child& c) { return c.name == name && stopped(c); });
+}
+
+void Launcher::kill_stopped(const std::string& but) {
+  for (const Child& child : children_)
+    if (child.name != but && stopped(child)) ::kill(child.pid, SIGKILL);
 }
 
 bool Launcher::running(const std::string& name) const {
@@ -155,7 +197,10 @@ std::string Launcher::names() const {
 }
 
 void Launcher::kill_all() {
-  for (const Child& child : children_) ::kill(child.pid, SIGKILL);
+  for (Child& child : children_) {
+    child.again = false;
+    ::kill(child.pid, SIGKILL);
+  }
   while (!children_.empty()) reap(0);
 }
 

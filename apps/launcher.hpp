@@ -7,6 +7,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <stdexcept>
@@ -24,10 +25,11 @@ class LaunchError : public std::runtime_error {
 /// A process that ended.
 struct Exited {
   std::string name;
-  int code = 0;                      ///< exit code, or 128 + signal
-  std::string how{};                 ///< "exit code 1", "killed by signal 9 (Killed)"
-  std::string last_words{};          ///< what it wrote to stderr, without the trailing newline
-  std::vector<std::string> notes{};  ///< what it told the launcher to keep
+  int code = 0;                       ///< exit code, or 128 + signal
+  std::string how{};                  ///< "exit code 1", "killed by signal 9 (Killed)"
+  std::string last_words{};           ///< what it wrote to stderr, without the trailing newline
+  std::vector<std::string> notes{};   ///< what it told the launcher to keep
+  std::vector<std::string> struck{};  ///< faults that it says have had an effect
 
   std::string sentence() const;  ///< "drive X: killed by signal 9 (Killed): last words"
 };
@@ -45,13 +47,20 @@ class Launcher {
   void start(const std::string& name, std::vector<std::string> argv);
 
   /// Waits until every started process said that it is ready. Throws LaunchError naming the one
-  /// that ended or stayed silent.
-  void wait_all_ready(int timeout_ms);
+  /// that ended or stayed silent. `meanwhile` is called every few milliseconds, if given.
+  void wait_all_ready(int timeout_ms, const std::function<void()>& meanwhile = nullptr);
 
   /// Waits up to timeout_ms for something to happen; gives an exit if there was one.
   std::optional<Exited> next(int timeout_ms, const OnProgress& on_progress);
 
   void signal(const std::string& name, int signal_number);
+  /// Kills it; when next() gives its exit, it has been started again as before.
+  void restart(const std::string& name);
+  /// From now on its writes beyond this size of a file fail, as on a full disk.
+  void limit_files(const std::string& name, std::uintmax_t bytes);
+  /// Kills those that are stopped (SIGSTOP) and would not end by themselves, but for one.
+  void kill_stopped(const std::string& but);
+  bool stopped(const std::string& name) const;  ///< by SIGSTOP
   bool running(const std::string& name) const;
   std::size_t running() const { return children_.size(); }
   std::string names() const;  ///< of all that run
@@ -66,7 +75,11 @@ class Launcher {
     bool ready = false;
     std::string partial_line{};
     std::vector<std::string> notes{};
+    std::vector<std::string> struck{};
+    std::vector<std::string> argv{};
+    bool again = false;  ///< start it anew when it has ended
   };
+  static bool stopped(const Child& child);
   Exited reap(std::size_t index);
   bool read_lines(Child& child, const OnProgress& on_progress);  ///< false at end of file
 

@@ -182,7 +182,6 @@ class Builder {
       text +=
           "G1 " + words(m.touch + s_.predeflection * m.way + believed) + feed() + "\nG4 P0.05\n";
     if (s_.kind == Kind::not_retracted) {
-      result_.within_limit = false;  // rapids are not checked
       text += "G0 " + words(end) + "\n";
     } else {
       text += "G1 " + words(end);
@@ -193,7 +192,6 @@ class Builder {
   }
 
   void swing() {
-    result_.within_limit = false;  // rotary motions are not checked
     const RotaryPair at{s_.a, s_.c};
     const Kinematics k = kinematics();
     const AxisVector touching = k.inverse(s_.at, at.a, at.c);
@@ -236,14 +234,30 @@ class Builder {
   LockoutCase result_;
 };
 
+BusFaults faults_of(const Scenario& scenario) {
+  BusFaults faults;
+  for (const std::string& text : scenario.faults) {
+    const auto refuse = [&](const char* why) {
+      throw InputError(scenario.name + ": faults: \"" + text + "\": " + why);
+    };
+    try {
+      faults.push_back(parse_fault(text));
+    } catch (const std::invalid_argument& e) {
+      refuse(e.what());
+    }
+    if (faults.back().of_host()) refuse("needs processes; see vcnc lockout --processes");
+  }
+  return faults;
+}
+
 }  // namespace
 
 LockoutCase make_case(const Scenario& scenario) {
-  if (!scenario.faults.empty())
-    throw InputError(scenario.name + ": faults: \"" + scenario.faults.front() +
-                     "\": faults are not possible yet, the list must be empty");
+  const BusFaults faults = faults_of(scenario);
   try {
-    return Builder(scenario).build();
+    LockoutCase result = Builder(scenario).build();
+    result.faults = faults;
+    return result;
   } catch (const std::invalid_argument& e) {
     throw InputError(scenario.name + ": " + e.what());
   }

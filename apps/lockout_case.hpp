@@ -17,6 +17,7 @@
 #include <optional>
 #include <string>
 
+#include "bus/fault.hpp"
 #include "configs/scenario.hpp"
 #include "model/machine.hpp"
 
@@ -26,7 +27,8 @@ struct LockoutCase {
   Machine machine;  ///< its start positions are those of the scenario
   std::optional<PieceParams> piece;
   std::string program;
-  bool within_limit = true;  ///< the feed check of the NC unit covers the way
+  BusFaults faults{};        ///< those at contact not yet resolved
+  bool within_limit = true;  ///< as the scenario says
 };
 
 /// Throws InputError where the scenario cannot be made.

@@ -8,7 +8,9 @@
 
 #include "analysis/session.hpp"
 #include "apps/launcher.hpp"
+#include "apps/lockout_fault.hpp"
 #include "apps/lockout_page.hpp"
+#include "apps/lockout_processes.hpp"
 #include "apps/lockout_report.hpp"
 #include "apps/node_options.hpp"
 #include "apps/progress_line.hpp"
@@ -39,8 +41,15 @@ expected (key `expect`)
   safe            refused before anything moves, or a trip
   refused         refused before anything moves
   none            no trip; the program comes to its end
+  fault_safe      with faults: a safe stand-still with an alarm that names the cause, or no stop
+                  because nothing was driven out of range
 
-all keys of a scenario file
+faults (key `faults`; all kinds: vcnc faults), with a moment of the run or of the first touch
+  faults = ["probe mute from_s=0.8", "drive X deaf at=contact from_s=0.02 for_s=0.005"]
+With faults every run is judged by the table below besides what it is expected to do: every axis
+truly stands, the spindle was locked or stood by then and stays locked, states are latched, an alarm
+names the cause, every cycle is recorded, the axes brake within 6 cycles of the sample that shows
+the range left, the deflection stays below the mechanical limit where the feed was checked.
 
 )";
 
@@ -97,15 +106,20 @@ LockoutVerdict run_into_folder(const LockoutItem& item, const std::string& out) 
 
 int lockout_command(LockoutArguments a) {
   if (a.list) {
-    std::cout << kKinds << scenario_key_reference();
+    std::cout << kKinds << fault_tolerances_markdown() << "\nall keys of a scenario file\n\n"
+              << scenario_key_reference();
     return kExitOk;
   }
   if (!a.out.empty() && a.only.empty())
     throw InputError("--out: needs --only ID, which names the run that is written there");
   for (const std::string& path : {a.json, a.junit, a.html}) check_writable(path);
   if (a.machines.empty()) a.machines = shipped_machines();
-  LockoutResults results{.seed = a.seed, .items = lockout_items(a)};
-  if (results.items.empty()) throw InputError("nothing to run: no scenario file and --scenarios 0");
+  if (a.only.starts_with("process-") && a.processes == 0)
+    throw InputError("--only " + a.only + ": needs --processes");
+  LockoutResults results{.seed = a.seed};
+  if (!a.only.starts_with("process-")) results.items = lockout_items(a);
+  if (results.items.empty() && a.processes == 0)
+    throw InputError("nothing to run: no scenario file and --scenarios 0");
   catch_stop_signals();
   const Pacer clock;
   if (!a.out.empty()) {
@@ -119,8 +133,26 @@ int lockout_command(LockoutArguments a) {
         LockoutRunner{.jobs = a.jobs, .stop = &stop_requested(), .progress = show}.run(
             results.items);
   }
-  results.wall_seconds = clock.elapsed();
   results.interrupted = results.verdicts.size() < results.items.size();
+  if (a.processes > 0) {
+    ProgressLine line;
+    const ProcessSuite suite{
+        .seed = a.seed,
+        .runs = a.processes,
+        .machines = a.machines,
+        .program = program_directory() + "/vcnc",
+        .jobs = a.jobs > 0 ? a.jobs : 1,
+        .only = a.only,
+        .stop = &stop_requested(),
+        .progress = [&](std::size_t done, std::size_t bad) {
+          line.show(fmt::format("{} of {} runs on real processes, {} not as expected", done,
+                                a.processes, bad));
+        }};
+    std::vector<LockoutVerdict> verdicts = suite.run();
+    results.interrupted = results.interrupted || (a.only.empty() && verdicts.size() < a.processes);
+    for (LockoutVerdict& verdict : verdicts) results.verdicts.push_back(std::move(verdict));
+  }
+  results.wall_seconds = clock.elapsed();
   results.summary = summarise(results.verdicts);
   std::cout << lockout_text(results);
   write_file(a.json, lockout_json(results));

@@ -10,6 +10,7 @@ namespace vcnc {
 struct LockoutArguments : LockoutOptions {
   std::string json, junit, html;  ///< files to write; empty: not
   std::string out;                ///< with `only`: run folder
+  std::uint64_t processes = 0;    ///< runs on real processes
   bool list = false;              ///< tells the kinds and keys instead
 };
 

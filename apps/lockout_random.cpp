@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/fault_draw.hpp"
 #include "configs/config.hpp"
 #include "model/probe/contact.hpp"
 #include "model/probe/noise.hpp"
@@ -37,7 +38,8 @@ class Draw {
   std::uint64_t seed_, stream_, counter_;
 };
 
-constexpr std::uint64_t kCrashStream = 0x6c6f636b0001, kOrdinaryStream = 0x6c6f636b0002;
+constexpr std::uint64_t kCrashStream = 0x6c6f636b0001, kOrdinaryStream = 0x6c6f636b0002,
+                        kFaultedStream = 0x6c6f636b0003;
 
 /// What the probe and the axes are like, and where the ball is.
 ProbeParams draw_machine(Draw& draw, const std::vector<std::string>& machines, Scenario& s) {
@@ -107,13 +109,33 @@ ScenarioDraw::ScenarioDraw(std::uint64_t seed, std::vector<std::string> machines
 }
 
 Scenario ScenarioDraw::crash(std::uint64_t number) const {
-  Draw draw(seed_, kCrashStream, number);
+  return crash(kCrashStream, number, Feed::any);
+}
+
+Scenario ScenarioDraw::faulted(std::uint64_t number) const {
+  Scenario s = crash(kFaultedStream, number, Feed::usual);
+  const double range = load_machine(s.machine, s.set).probe.range;
+  const double speed = s.kind == Kind::rotary ? 20e-3 : s.feed;
+  const auto cycles = [](double t) { return static_cast<Tick>(std::ceil(t / kCycle)); };
+  constexpr Tick kBefore = 50;
+  BusFault fault = FaultDraw(seed_).in_turn(number, -kBefore, cycles(range / speed));
+  fault.at_contact = true;
+  s.faults = {text_of(fault)};
+  s.name = fmt::format("{} {}, {}", to_string(s.kind), number, s.faults.front());
+  s.expect = Expect::fault_safe;
+  return s;
+}
+
+Scenario ScenarioDraw::crash(std::uint64_t stream, std::uint64_t number, Feed feed) const {
+  Draw draw(seed_, stream, number);
   Scenario s;
   s.kind = draw_kind(draw);
   s.name = fmt::format("{} {}", to_string(s.kind), number);
   const ProbeParams probe = draw_machine(draw, machines_, s);
   draw_target(draw, s);
-  const double most = draw.chance(0.35) ? 20000 : 5000;  // [mm/min]
+  if (feed == Feed::usual && s.kind == Kind::spindle_start) s.kind = Kind::program_error;
+  const double most = draw.chance(0.35) ? (feed == Feed::usual ? 4000 : 20000)
+                                        : (feed == Feed::usual ? 1500 : 5000);  // [mm/min]
   s.feed = rounded(draw.log_between(300, most), 0.1) * 1e-3 / 60;
   s.rotary_feed = rounded(draw.log_between(1, 60), 0.01) * kDegree;
   switch (draw.index(4)) {
@@ -153,10 +175,12 @@ Scenario ScenarioDraw::crash(std::uint64_t number) const {
   if (draw.chance(0.25) && s.kind != Kind::not_retracted && s.kind != Kind::rotary)
     s.predeflection = rounded(draw.between(0.1, 0.5) * std::cos(s.incidence) * probe.range, 1e-6);
   const bool fast = s.feed > 1500e-3 / 60;
-  s.expect = s.kind == Kind::spindle_start                             ? Expect::refused
-             : s.kind == Kind::rotary || s.kind == Kind::not_retracted ? Expect::trip
-             : fast                                                    ? Expect::safe
-                                                                       : Expect::trip;
+  // A swing may be refused, too: its lever is drawn.
+  s.expect = s.kind == Kind::spindle_start   ? Expect::refused
+             : s.kind == Kind::rotary        ? Expect::safe
+             : s.kind == Kind::not_retracted ? Expect::trip
+             : fast                          ? Expect::safe
+                                             : Expect::trip;
   return s;
 }
 

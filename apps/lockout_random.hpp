@@ -24,8 +24,14 @@ class ScenarioDraw {
 
   Scenario crash(std::uint64_t number) const;
   Scenario ordinary(std::uint64_t number) const;
+  /// A crash of slow or middle feed and one fault, 50 ms before the first touch up to the trip.
+  /// Kind and node go through all there are (apps/fault_draw.hpp).
+  Scenario faulted(std::uint64_t number) const;
 
  private:
+  enum class Feed { any, usual };
+  Scenario crash(std::uint64_t stream, std::uint64_t number, Feed feed) const;
+
   std::uint64_t seed_;
   std::vector<std::string> machines_;
 };

@@ -28,7 +28,7 @@ std::vector<Row> rows(const LockoutSummary& s) {
           {"stand-still", "ms", &s.standstill_time, 1e3},
           {"stopping distance", "mm", &s.stopping_distance, 1e3},
           {"deepest, share of limit", "%", &s.limit_share, 100},
-          {"  rapids, rotary moves", "%", &s.unchecked_share, 100}};
+          {"  where it may pass it", "%", &s.unchecked_share, 100}};
 }
 
 std::string table(const LockoutSummary& s) {
@@ -88,6 +88,9 @@ std::string run_json(const LockoutVerdict& v) {
   std::string failures;
   for (const std::string& sentence : v.failures)
     failures += fmt::format("{}\"{}\"", failures.empty() ? "" : ", ", escaped_json(sentence));
+  std::string faults;
+  for (const std::string& fault : v.faults)
+    faults += fmt::format("{}\"{}\"", faults.empty() ? "" : ", ", escaped_json(fault));
   return fmt::format(
       "    {{\"id\": \"{}\", \"name\": \"{}\", \"kind\": \"{}\", \"expect\": \"{}\", \"passed\": "
       "{}, "
@@ -97,7 +100,7 @@ std::string run_json(const LockoutVerdict& v) {
       "\"standstill_ms\": {}, \"speed_mm_s\": {}, \"stopping_distance_mm\": {}, \"deepest_mm\": "
       "{}, "
       "\"force_N\": {}, \"share_of_limit\": {}, \"feed_checked\": {}, \"cycles\": {}, \"reason\": "
-      "\"{}\", \"trace_hash\": \"{}\"}}",
+      "\"{}\", \"faults\": [{}], \"exit_code\": {}, \"phase\": \"{}\", \"trace_hash\": \"{}\"}}",
       escaped_json(v.id), escaped_json(v.name), to_string(v.kind), to_string(v.expect), v.passed(),
       failures, v.end.refused, f.soft, f.hard,
       f.tripped() ? text_of(static_cast<ProtectionCause>(f.cause)) : "", f.countable,
@@ -105,7 +108,8 @@ std::string run_json(const LockoutVerdict& v) {
       number((f.locked - f.threshold) * 1e3), number((f.standstill - f.threshold) * 1e3),
       number(f.speed * 1e3), number(f.stopping_distance * 1e3), number(f.deepest * 1e3),
       number(f.force), number(f.limit_share), v.within_limit, v.cycles, escaped_json(v.end.reason),
-      v.trace_hash);
+      faults, v.process ? std::to_string(v.process->exit_code) : "null",
+      v.process ? v.process->phase : "", v.trace_hash);
 }
 
 std::string escaped_xml(const std::string& text) {
@@ -134,17 +138,61 @@ std::string escaped_xml(const std::string& text) {
 }  // namespace
 
 std::string repeat_arguments(const LockoutResults& results, const LockoutVerdict& verdict) {
-  const bool drawn = verdict.id.starts_with("crash-") || verdict.id.starts_with("ordinary-");
+  const bool drawn = verdict.id.starts_with("crash-") || verdict.id.starts_with("ordinary-") ||
+                     verdict.id.starts_with("faulted-") || verdict.process;
+  if (verdict.process)
+    return fmt::format("--processes 1 --only {} --seed {}", verdict.id, results.seed);
   return drawn ? fmt::format("--only {} --seed {}", verdict.id, results.seed)
                : fmt::format("--only {}", verdict.id);
+}
+
+std::string process_table(const LockoutResults& r) {
+  struct Row {
+    std::size_t runs = 0, late = 0, unsafe = 0;
+    std::map<int, std::size_t> codes;
+    double longest = 0;
+  };
+  std::map<std::string, Row> by_kind, by_node, by_phase;
+  for (const LockoutVerdict& v : r.verdicts) {
+    if (!v.process) continue;
+    const BusFault fault = parse_fault(v.faults.front());
+    const auto kind = std::find_if(fault_kinds().begin(), fault_kinds().end(),
+                                   [&](const FaultKind& k) { return k.kind == fault.kind; });
+    for (Row* row :
+         {&by_kind[std::string(kind->name)], &by_node[fault.node], &by_phase[v.process->phase]}) {
+      ++row->runs;
+      row->late += !v.process->struck;
+      row->unsafe += !v.passed();
+      ++row->codes[v.process->exit_code];
+      row->longest = std::max(row->longest, v.process->seconds);
+    }
+  }
+  if (by_kind.empty()) return "";
+  std::string text =
+      "\nreal processes       runs  not safe  after the end  exit 0  exit 1  exit 3  longest\n";
+  for (const auto* rows : {&by_kind, &by_node, &by_phase}) {
+    for (const auto& [name, row] : *rows) {
+      const auto codes = [&](int code) {
+        const auto found = row.codes.find(code);
+        return found == row.codes.end() ? std::size_t{0} : found->second;
+      };
+      text +=
+          fmt::format("  {:18} {:>4}  {:>8}  {:>13}  {:>6}  {:>6}  {:>6}  {:>5.1f} s\n", name,
+                      row.runs, row.unsafe, row.late, codes(0), codes(1), codes(3), row.longest);
+    }
+    text += "\n";
+  }
+  return text;
 }
 
 std::string lockout_text(const LockoutResults& r) {
   const LockoutSummary& s = r.summary;
   std::string text;
   if (r.interrupted) text += "interrupted: not every scenario was run\n";
-  text += fmt::format("{} runs in {:.1f} s: {} crashes, {} ordinary, seed {}\n", s.runs,
-                      r.wall_seconds, s.crashes, s.ordinary, r.seed);
+  text += fmt::format(
+      "{} runs in {:.1f} s: {} crashes, {} ordinary, {} crashes with a fault, {} on real "
+      "processes, seed {}\n",
+      s.runs, r.wall_seconds, s.crashes, s.ordinary, s.faulted, s.processes, r.seed);
   text += fmt::format("  refused before anything moved   {:>7}\n", s.refused);
   text += fmt::format("  soft stop and retraction        {:>7}\n", s.soft);
   text += fmt::format("  soft stop, then quick stop      {:>7}\n", s.both);
@@ -153,12 +201,17 @@ std::string lockout_text(const LockoutResults& r) {
   text += fmt::format("  tripped before the range was left {:>5}\n", s.early);
   text += fmt::format("  missed trips                    {:>7}\n", s.missed);
   text += fmt::format("  trips in ordinary runs          {:>7}\n", s.false_trips);
+  if (s.faulted > 0) {
+    text += fmt::format("  with a fault: not safe          {:>7}\n", s.unsafe);
+    text += fmt::format("  with a fault: ended as if none  {:>7}\n", s.borne);
+  }
   text += fmt::format("  not as expected                 {:>7}\n\n", s.runs - s.as_expected);
   text += "from the physical threshold, times and ways\n" + table(s);
   text += bars("reaction: out of range to braking axes", s.reaction, 1e3, 0, 3, 12, "ms");
   text += bars("reaction: hard stage to quick stop", s.hard_reaction, 1e3, 0, 3, 12, "ms");
   text += bars("deepest deflection, share of the mechanical limit", s.limit_share, 100, 0, 100, 10,
                "%");
+  text += process_table(r);
   std::size_t told = 0;
   for (const LockoutVerdict& v : r.verdicts) {
     if (v.passed()) continue;
@@ -178,11 +231,13 @@ std::string lockout_json(const LockoutResults& r) {
   std::string text = "{\n";
   text += fmt::format(
       "  \"seed\": {},\n  \"runs\": {},\n  \"crashes\": {},\n  \"ordinary\": {},\n"
+      "  \"faulted\": {},\n  \"processes\": {},\n  \"unsafe\": {},\n  \"borne\": {},\n"
       "  \"as_expected\": {},\n  \"missed\": {},\n  \"false_trips\": {},\n  \"refused\": {},\n"
       "  \"soft_stops\": {},\n  \"soft_then_quick_stops\": {},\n  \"quick_stops\": {},\n"
       "  \"uncountable\": {},\n  \"early\": {},\n  \"interrupted\": {},\n",
-      r.seed, s.runs, s.crashes, s.ordinary, s.as_expected, s.missed, s.false_trips, s.refused,
-      s.soft, s.both, s.hard, s.uncountable, s.early, r.interrupted);
+      r.seed, s.runs, s.crashes, s.ordinary, s.faulted, s.processes, s.unsafe, s.borne,
+      s.as_expected, s.missed, s.false_trips, s.refused, s.soft, s.both, s.hard, s.uncountable,
+      s.early, r.interrupted);
   const auto add = [&](const char* key, const Distribution& d, double scale) {
     text += fmt::format("  \"{}\": {},\n", key, distribution_json(d, scale));
   };
@@ -201,7 +256,11 @@ std::string lockout_json(const LockoutResults& r) {
 
 std::string lockout_junit(const LockoutResults& r) {
   std::map<std::string, std::vector<const LockoutVerdict*>> suites;
-  for (const LockoutVerdict& v : r.verdicts) suites[to_string(v.kind)].push_back(&v);
+  for (const LockoutVerdict& v : r.verdicts)
+    suites[v.process          ? "processes"
+           : v.faults.empty() ? to_string(v.kind)
+                              : "faulted"]
+        .push_back(&v);
   const auto failed = [](const std::vector<const LockoutVerdict*>& suite) {
     return std::count_if(suite.begin(), suite.end(),
                          [](const LockoutVerdict* v) { return !v->passed(); });

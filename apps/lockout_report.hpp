@@ -20,6 +20,8 @@ struct LockoutResults {
 
 /// Table, distributions with histograms, and how to repeat what was not as expected.
 std::string lockout_text(const LockoutResults& results);
+/// Runs on real processes by kind, process and phase; empty without any.
+std::string process_table(const LockoutResults& results);
 std::string lockout_json(const LockoutResults& results);
 std::string lockout_junit(const LockoutResults& results);
 

@@ -10,6 +10,7 @@
 #include <exception>
 #include <filesystem>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <thread>
 
@@ -39,33 +40,44 @@ std::int64_t number_after(const std::string& id, const std::string& prefix) {
 std::vector<LockoutItem> lockout_items(const LockoutOptions& options) {
   std::vector<LockoutItem> items;
   std::set<std::string> used;
+  std::optional<LockoutFolder> folder;
   for (const std::string& file : options.files) {
     std::string id = fs::path(file).stem().string();
     for (int copy = 2; !used.insert(id).second; ++copy)
       id = fmt::format("{}-{}", fs::path(file).stem().string(), copy);
     LockoutItem item{id, load_scenario(file)};
     if (item.scenario.name.empty()) item.scenario.name = item.id;
-    if (options.only.empty() || options.only == item.id) items.push_back(std::move(item));
+    if (!options.only.empty() && options.only != item.id) continue;
+    if (!folder) folder.emplace();
+    check_runnable(item.scenario, file, folder->path());
+    items.push_back(std::move(item));
   }
   const std::int64_t crash = number_after(options.only, "crash-"),
-                     ordinary = number_after(options.only, "ordinary-");
+                     ordinary = number_after(options.only, "ordinary-"),
+                     faulted = number_after(options.only, "faulted-");
   const auto name = [](const char* prefix, std::uint64_t i) {
     return fmt::format("{}{}", prefix, i);
   };
-  if (!options.only.empty() && items.empty() && crash < 0 && ordinary < 0)
-    throw InputError("--only " + options.only +
-                     ": no such run; expected crash-N, ordinary-N or the name of a scenario file");
+  if (!options.only.empty() && items.empty() && crash < 0 && ordinary < 0 && faulted < 0)
+    throw InputError(
+        "--only " + options.only +
+        ": no such run; expected crash-N, ordinary-N, faulted-N or the name of a scenario file");
   const bool all = options.only.empty();
-  if ((all && options.crashes + options.ordinary > 0) || crash >= 0 || ordinary >= 0) {
+  if ((all && options.crashes + options.ordinary + options.faulted > 0) || crash >= 0 ||
+      ordinary >= 0 || faulted >= 0) {
     const ScenarioDraw draw(options.seed, options.machines);
     if (crash >= 0) items.push_back({options.only, draw.crash(static_cast<std::uint64_t>(crash))});
     if (ordinary >= 0)
       items.push_back({options.only, draw.ordinary(static_cast<std::uint64_t>(ordinary))});
+    if (faulted >= 0)
+      items.push_back({options.only, draw.faulted(static_cast<std::uint64_t>(faulted))});
     if (all) {
       for (std::uint64_t i = 0; i < options.crashes; ++i)
         items.push_back({name("crash-", i), draw.crash(i)});
       for (std::uint64_t i = 0; i < options.ordinary; ++i)
         items.push_back({name("ordinary-", i), draw.ordinary(i)});
+      for (std::uint64_t i = 0; i < options.faulted; ++i)
+        items.push_back({name("faulted-", i), draw.faulted(i)});
     }
   }
   return items;
@@ -167,16 +179,24 @@ LockoutSummary summarise(const std::vector<LockoutVerdict>& verdicts) {
   for (const LockoutVerdict& v : verdicts) {
     const TripFigures& f = v.figures;
     ++s.runs;
-    const bool crash = v.expect != Expect::none;
-    ++(crash ? s.crashes : s.ordinary);
+    if (v.process) {
+      ++s.processes;
+      s.as_expected += v.passed();
+      continue;
+    }
+    const bool faulted = !v.faults.empty() || v.expect == Expect::fault_safe;
+    const bool crash = !faulted && v.expect != Expect::none;
+    ++(faulted ? s.faulted : crash ? s.crashes : s.ordinary);
+    s.unsafe += faulted && !v.passed();
+    s.borne += faulted && v.end.complete;
     s.as_expected += v.passed();
     s.refused += v.end.refused;
     s.soft += f.soft && !f.hard;
     s.hard += f.hard && !f.soft;
     s.both += f.soft && f.hard;
     s.missed += crash && v.expect != Expect::refused && !v.end.refused && !f.tripped();
-    s.false_trips += !crash && f.tripped();
-    if (!f.tripped()) continue;
+    s.false_trips += !crash && !faulted && f.tripped();
+    if (faulted || !f.tripped()) continue;  // figures are those of the healthy machine
     s.uncountable += !f.countable;
     (v.within_limit ? share : unchecked).push_back(f.limit_share);
     if (f.countable && f.hard_threshold < f.quick_stop) hard.push_back(f.hard_reaction());

@@ -18,11 +18,11 @@ struct LockoutItem {
 
 struct LockoutOptions {
   std::uint64_t seed = 1;
-  std::uint64_t crashes = 500, ordinary = 500;  ///< drawn scenarios
-  std::vector<std::string> machines{};          ///< for the drawn ones
-  std::vector<std::string> files{};             ///< scenario files
-  std::string only{};                           ///< an id: this one alone
-  int jobs = 0;                                 ///< threads; 0: one per processor
+  std::uint64_t crashes = 500, ordinary = 500, faulted = 0;  ///< drawn scenarios
+  std::vector<std::string> machines{};                       ///< for the drawn ones
+  std::vector<std::string> files{};                          ///< scenario files
+  std::string only{};                                        ///< an id: this one alone
+  int jobs = 0;                                              ///< threads; 0: one per processor
 };
 
 /// The scenarios of a suite, in order. Throws InputError.
@@ -68,18 +68,20 @@ struct Distribution {
 
 /// A suite as figures.
 struct LockoutSummary {
-  std::size_t runs = 0, crashes = 0, ordinary = 0, as_expected = 0;
+  std::size_t runs = 0, crashes = 0, ordinary = 0, faulted = 0, processes = 0, as_expected = 0;
   std::size_t refused = 0, soft = 0, hard = 0, both = 0;
   std::size_t missed = 0;       ///< a stop was expected and none came
   std::size_t false_trips = 0;  ///< no stop was expected and one came
+  std::size_t unsafe = 0;       ///< with a fault, not as it must be
+  std::size_t borne = 0;        ///< with a fault, and the program came to its end
   std::size_t uncountable = 0;  ///< tripped while the ball was too fast for the sensor
   std::size_t early = 0;        ///< tripped before the range was left: the reading was lost
   /// Of the runs that tripped countably: from the range to the first action (hold or quick stop),
   /// and from the hard threshold to the quick stop [s].
   Distribution reaction, hard_reaction;
   Distribution stopping_distance;  ///< [m]
-  Distribution limit_share;        ///< where the feed check covers the way
-  Distribution unchecked_share;    ///< elsewhere: rapids and rotary motions
+  Distribution limit_share;        ///< where it must stay below 1
+  Distribution unchecked_share;    ///< of scenarios with within_limit = false
   Distribution lock_time;          ///< [s] from T to the locked spindle
   Distribution standstill_time;    ///< [s] from T
 };

@@ -13,9 +13,9 @@
 // Required is a reaction to a sample that shows
 //   beyond the usable range                any stop
 //   beyond 125 % of it, or at the limit    a quick stop
-// but only the limit where the feed check does not cover the way (rapids, rotary motions) and the
-// ball moves faster than its periods can be counted (signal period / 200 us): then the sensor
-// cannot know, and the mechanical switch is what is left.
+// but only the limit where the scenario does not ask for more (within_limit = false) and the ball
+// moves faster than its periods can be counted (signal period / 200 us): then the sensor cannot
+// know, and the mechanical switch is what is left.
 // A deflection may be read wrong by the scenario's reading error.
 #pragma once
 
@@ -26,13 +26,15 @@
 #include "bus/frame.hpp"
 #include "bus/main_loop.hpp"
 #include "bus/messages.hpp"
+#include "bus/telemetry.hpp"
 #include "configs/scenario.hpp"
 #include "model/axes.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {
 
-class ProbeNode;
+class OvertravelNode;
+class VirtualMachine;
 
 /// One cycle as an observer sees it.
 struct TripCycle {
@@ -45,19 +47,32 @@ struct TripCycle {
   int drives_in_operation = 0;
   bool spindle_locked = false;
   double spindle_speed = 0;
+
+  // What is, whatever the frames say.
+  AxisVector axes{};            ///< where they are at t_k
+  bool left_operation = false;  ///< a drive that was in operation is no more
+  bool spindle_safe = false;    ///< locked, or stands
+  bool lock = false;            ///< the spindle cannot turn
+  OvertravelState::State protection = OvertravelState::State::normal;  ///< of the module
 };
 
 using TripLog = std::vector<TripCycle>;
 
-/// Fills a log from the frames on the bus and the probe's true deflection. Both outlive it.
+/// Fills a log from the frames on the bus and from what is true in the modules. All outlive it.
 class TripTap : public FrameTap {
  public:
-  TripTap(const ProbeNode& probe, TripLog& log) : probe_(probe), log_(log) {}
+  /// `overtravel` is the one in use.
+  TripTap(const VirtualMachine& modules, const OvertravelNode& overtravel, TripLog& log)
+      : modules_(modules), overtravel_(overtravel), log_(log) {}
   void cycle(Tick k, std::span<const Frame> frames) override;
 
  private:
-  const ProbeNode& probe_;
+  void look_inside(TripCycle& cycle);
+
+  const VirtualMachine& modules_;
+  const OvertravelNode& overtravel_;
   TripLog& log_;
+  int most_in_operation_ = 0;
 };
 
 inline constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
@@ -91,7 +106,9 @@ struct TripEnd {
   std::string reason;
   std::size_t rows = 0;                         ///< telemetry
   bool soft_alarm = false, hard_alarm = false;  ///< 1003, 1004; 1001, 1002
+  std::vector<Alarm> alarms{};
   bool spindle_stays_locked = true;  ///< M3 after the trip, without and with the NC unit's lock
+  Tick run_down = 0;  ///< cycles in which the last axis comes to rest when the bus ends, -1: never
   bool module_stays_latched = true;  ///< with a probe that reads zero again
 };
 
@@ -101,6 +118,9 @@ TripFigures measure(const TripLog& log, const Machine& machine);
 std::vector<std::string> judge(const Scenario& scenario, bool within_limit, const TripLog& log,
                                const TripFigures& figures, const TripEnd& end,
                                const Machine& machine);
+
+/// Whether the axes stand from cycle k on for some cycles, as they truly are.
+bool truly_standing(const TripLog& log, Tick k);
 
 /// The deflection as a share of where the probe's own protection unit switches.
 double limit_share(const ProbeParams& probe, const Vec3& deflection);

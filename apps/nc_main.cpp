@@ -1,7 +1,9 @@
 // vcnc-nc: the NC unit. Master of the bus, plays the program, publishes the samples over DDS.
 #include <iostream>
 
+#include "apps/control_pipe.hpp"
 #include "apps/faults.hpp"
+#include "apps/memory_folder.hpp"
 #include "apps/nc_run.hpp"
 #include "apps/node_options.hpp"
 #include "apps/stop_signal.hpp"
@@ -14,7 +16,7 @@ constexpr int kSubscriberTimeoutMs = 15000;
 
 int nc(int argc, char** argv) {
   using namespace vcnc;
-  const NodeOptions options = parse_node_options(argc, argv, "The NC unit", "mpbs");
+  const NodeOptions options = parse_node_options(argc, argv, "The NC unit", "mpbsk");
   const Machine machine = load_machine(options.machine);
   catch_stop_signals();
   const auto transport = open_transport(options.bus, 0);
@@ -22,6 +24,7 @@ int nc(int argc, char** argv) {
   telemetry.paced = options.pace > 0;
   DdsPublisher publisher(telemetry);
   publisher.wait_for_subscriber(kSubscriberTimeoutMs);
+  SlotFiles memory(options.memory, "nc");
   const NcRunResult result = run_nc(
       machine,
       {.program = options.program,
@@ -30,8 +33,13 @@ int nc(int argc, char** argv) {
        .piece_toml = machine.setup.piece.empty() ? "" : to_toml(load_piece(machine.setup.piece)),
        .stop = &stop_requested(),
        .faults = parse_faults(options.faults),
-       .answer_timeout_ms = options.answer_timeout_ms},
+       .answer_timeout_ms = options.answer_timeout_ms,
+       .memory = options.memory.empty() ? nullptr : &memory,
+       .on_power_return =
+           options.on_power_return == "resume" ? OnPowerReturn::resume : OnPowerReturn::end,
+       .resume = options.resume},
       *transport, publisher);
+  for (const std::string& fault : result.struck) ControlPipe(options.control_fd).struck(fault);
   if (result.exit_code() == kExitFailure) std::cerr << result.end.reason;
   return result.exit_code();
 }

@@ -10,6 +10,7 @@
 #include "bus/main_loop.hpp"
 #include "bus/telemetry.hpp"
 #include "bus/transport.hpp"
+#include "controller/nc_unit.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {
@@ -23,13 +24,17 @@ struct NcRunOptions {
   BusFaults faults{};                       ///< in simulated time; the modules have the same
   int answer_timeout_ms = 5000;             ///< of host time, for each module in each cycle
   std::vector<FrameTap*> taps{};            ///< see every frame
+  NodeMemory* memory = nullptr;             ///< of the NC unit
+  OnPowerReturn on_power_return = OnPowerReturn::end;
+  bool resume = false;  ///< the program that the memory says was interrupted
 };
 
 struct NcRunResult {
   RunEnd end;
-  bool alarmed = false;      ///< the machine stopped in an alarm
-  bool interrupted = false;  ///< Ctrl-C
-  bool node_lost = false;    ///< a module's program failed
+  bool alarmed = false;               ///< the machine stopped in an alarm
+  bool interrupted = false;           ///< Ctrl-C
+  bool node_lost = false;             ///< a module's program failed
+  std::vector<std::string> struck{};  ///< faults of the NC unit that have had an effect
   int exit_code() const;
 };
 

@@ -17,6 +17,9 @@ NodeOptions parse_node_options(int argc, char** argv, const char* description, c
     app.add_option("--program", o.program, "G-code program")->required();
     app.add_option("--pace", o.pace, "times real time, 0 = free-running")
         ->check(CLI::NonNegativeNumber);
+    app.add_option("--on-power-return", o.on_power_return, "when the mains return")
+        ->check(CLI::IsMember({"end", "resume"}));
+    app.add_flag("--resume", o.resume, "go on with the interrupted program");
   }
   if (with('b')) {
     app.add_option("--bus", o.bus, "hub:///PATH or can://INTERFACE")->required();
@@ -37,6 +40,11 @@ NodeOptions parse_node_options(int argc, char** argv, const char* description, c
     app.add_flag("--no-report", o.no_report, "no report.html");
   }
   if (with('s')) app.add_option("--seed", o.seed, "seed of all noise");
+  if (with('k')) app.add_option("--memory", o.memory, "folder of what the machine keeps");
+  if (with('w'))
+    app.add_option("--switched-on-at", o.switched_on_at, "axis positions, m and rad")
+        ->delimiter(',')
+        ->expected(5);
   app.add_option("--control-fd", o.control_fd, "pipe to the launcher");
   try {
     app.parse(argc, argv);

@@ -20,11 +20,17 @@ struct NodeOptions {
   int answer_timeout_ms = 5000;     ///< of host time, for each module in each cycle
   bool csv = false;                 ///< analysis: also write rows.csv
   bool no_report = false;           ///< analysis: no report.html
+  std::string memory;               ///< folder of what the machine keeps while it is off
+  std::vector<double>
+      switched_on_at;  ///< axis positions [m, rad]; empty: those of the machine file
+  std::string on_power_return = "end";
+  bool resume = false;  ///< NC unit: the program that was interrupted
   int control_fd = -1;
 };
 
 /// What a module program needs; each letter enables one option: m machine, p program and pace,
-/// b bus, faults and answer time-out, t truth, a axis, o out, s seed.
+/// b bus, faults and answer time-out, t truth, a axis, o out, s seed, k memory, w where the axes
+/// are switched on.
 NodeOptions parse_node_options(int argc, char** argv, const char* description, const char* needs);
 
 /// Runs a program's body: prints an exception as one line on stderr and turns it into exit code 2

@@ -1,4 +1,5 @@
 // vcnc-overtravel: the overtravel protection. It sees only the bus.
+#include "apps/memory_folder.hpp"
 #include "apps/serve.hpp"
 #include "configs/config.hpp"
 #include "probe_sim/overtravel_node.hpp"
@@ -8,8 +9,9 @@ namespace {
 int overtravel(int argc, char** argv) {
   using namespace vcnc;
   const NodeOptions options =
-      parse_node_options(argc, argv, "The overtravel protection on the bus", "mb");
-  OvertravelNode node(load_machine(options.machine));
+      parse_node_options(argc, argv, "The overtravel protection on the bus", "mbk");
+  SlotFiles memory(options.memory, "overtravel");
+  OvertravelNode node(load_machine(options.machine), options.memory.empty() ? nullptr : &memory);
   return serve(node, options);
 }
 

@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "apps/serve.hpp"
+#include "apps/switch_on.hpp"
 #include "bus/truth.hpp"
 #include "configs/config.hpp"
 #include "probe_sim/probe_node.hpp"
@@ -11,8 +12,8 @@ namespace {
 int probe(int argc, char** argv) {
   using namespace vcnc;
   const NodeOptions options =
-      parse_node_options(argc, argv, "The scanning probe on the bus", "mbts");
-  const Machine machine = load_machine(options.machine);
+      parse_node_options(argc, argv, "The scanning probe on the bus", "mbtsw");
+  const Machine machine = switched_on_at(load_machine(options.machine), options.switched_on_at);
   std::unique_ptr<Piece> piece;
   if (!machine.setup.piece.empty()) piece = make_piece(load_piece(machine.setup.piece));
   const auto truth = open_truth_reader(options.truth);

@@ -1,6 +1,7 @@
 #include "apps/run_command.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,13 +12,18 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iostream>
+#include <iterator>
 
 #include "analysis/session.hpp"
+#include "apps/fault_draw.hpp"
 #include "apps/faults.hpp"
 #include "apps/host_faults.hpp"
+#include "apps/interrupted_program.hpp"
 #include "apps/launcher.hpp"
 #include "apps/live_line.hpp"
+#include "apps/memory_content.hpp"
 #include "apps/nc_run.hpp"
 #include "apps/node_options.hpp"
 #include "apps/progress_line.hpp"
@@ -27,6 +33,7 @@
 #include "bus/hub.hpp"
 #include "bus/inproc.hpp"
 #include "configs/config.hpp"
+#include "configs/idle_effects.hpp"
 #include "controller/player.hpp"
 
 namespace vcnc {
@@ -35,7 +42,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kReadyTimeoutMs = 20000;
+constexpr int kLeastReadyTimeoutMs = 5000;
 constexpr int kStopTimeoutMs = 5000;           ///< modules, after the NC unit has ended
 constexpr int kResultsTimeoutMs = 300000;      ///< analysis, to write its results
 constexpr int kHastyResultsTimeoutMs = 20000;  ///< the same after Ctrl-C
@@ -53,13 +60,75 @@ std::unique_ptr<PieceParams> piece_of(const Machine& machine) {
   return piece;
 }
 
+OnPowerReturn on_power_return(const RunOptions& options) {
+  return options.on_power_return == "resume" ? OnPowerReturn::resume : OnPowerReturn::end;
+}
+
+/// A run with a memory: the folder, and what it says about where this run begins.
+struct Continuation {
+  std::optional<MemoryFolder> folder;
+  std::vector<double> switched_on_at;  ///< empty: where the machine file says
+};
+
+/// Opens the memory, and sees that this program may start with what it holds.
+Continuation open_memory(const RunOptions& options, const Machine& machine,
+                         const PieceParams* piece) {
+  Continuation start;
+  if (options.memory.empty()) {
+    if (options.resume) throw InputError("--resume: needs --memory DIR of the interrupted run");
+    return start;
+  }
+  start.folder.emplace(options.memory, !options.resume);
+  try {
+    const MemoryContent content = read_content(*start.folder);
+    if (!options.resume) {
+      check_fresh(content.nc, options.memory);
+      return start;
+    }
+    check_resume(content.nc, identity_of(machine, piece ? to_toml(*piece) : "", options.program),
+                 options.memory);
+    const Machine believed = as_nc_believes(machine);
+    const AxisVector position = position_at_switch_on(believed, *content.nc);
+    start.switched_on_at.assign(position.begin(), position.end());
+    if (driven_off_by_hand(believed, *content.nc))
+      std::cout
+          << "the probe still touched when the supply was exhausted; it is taken to have been "
+             "driven off by hand\n";
+  } catch (const MemoryError& e) {
+    throw InputError(e.what());
+  }
+  return start;
+}
+
+/// A fault that never had an effect is told: it may be a slip of the pen.
+void warn(const std::vector<std::string>& never) {
+  for (const std::string& fault : never)
+    std::cerr << "vcnc: warning: --fault \"" << fault
+              << "\": had no effect; the run was over before, or no such frame was sent\n";
+}
+
+/// Drawn over the time that the program takes; written as --fault takes them.
+std::vector<std::string> drawn_faults(const RunOptions& options, Player& player) {
+  Tick cycles = 0;
+  while (!player.step().done) ++cycles;
+  std::vector<std::string> texts;
+  const FaultDraw draw(options.seed);
+  for (int i = 0; i < options.random_faults; ++i)
+    texts.push_back(draw.any(static_cast<std::uint64_t>(i), 0, cycles).text);
+  return texts;
+}
+
 int run_in_process(const RunOptions& options, const Machine& machine, const PieceParams* piece,
-                   const BusFaults& faults, const RunFolder& folder) {
+                   const BusFaults& faults, const RunFolder& folder, const Continuation& start) {
   for (const BusFault& fault : faults)
     if (fault.of_host())
       throw InputError("--fault \"" + fault.text +
                        "\": needs processes; this run has all modules in one");
-  VirtualMachine modules(machine, piece, options.seed, faults);
+  SlotFiles nc(options.memory, "nc"), spindle(options.memory, "spindle"),
+      overtravel(options.memory, "overtravel");
+  const auto kept = [&](SlotFiles& files) { return start.folder ? &files : nullptr; };
+  VirtualMachine modules(switched_on_at(machine, start.switched_on_at), piece, options.seed, faults,
+                         {kept(spindle), kept(overtravel)});
   InprocTransport transport(modules.nodes());
   AnalysisSession session({.folder = folder.path(), .report = options.report, .csv = options.csv});
   ProgressLine progress;
@@ -70,14 +139,20 @@ int run_in_process(const RunOptions& options, const Machine& machine, const Piec
                                      .seed = options.seed,
                                      .piece_toml = piece ? to_toml(*piece) : "",
                                      .stop = &stop_requested(),
-                                     .faults = faults},
+                                     .faults = faults,
+                                     .memory = kept(nc),
+                                     .on_power_return = on_power_return(options),
+                                     .resume = options.resume},
                                     transport, live);
   progress.clear();
+  std::vector<std::string> struck = modules.struck();
+  struck.insert(struck.end(), result.struck.begin(), result.struck.end());
+  warn(never_struck(faults, struck));
   if (session.summary()) std::cout << to_text(*session.summary());
   return result.exit_code();
 }
 
-std::string text_of(const fs::path& path) {
+std::string file_text(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
@@ -131,45 +206,61 @@ std::vector<std::string> with(std::vector<std::string> argv, const std::vector<s
 
 /// Starts every module and the analysis, and waits until all are ready.
 void start_modules(Launcher& launcher, const RunOptions& options, const RunFolder& folder,
-                   const std::string& bus, const std::string& truth) {
+                   const Continuation& start, const std::string& bus, const std::string& truth,
+                   HostFaults& host_faults) {
   const std::string bin = program_directory();
   const std::string machine = folder.machine_file();
   const std::string seed = std::to_string(options.seed);
   const std::vector<std::string> common = common_options(options);
+  std::vector<std::string> kept, standing;
+  if (start.folder) kept = {"--memory", start.folder->path()};
+  if (!start.switched_on_at.empty())
+    standing = {fmt::format("--switched-on-at={:a}", fmt::join(start.switched_on_at, ","))};
   for (const char* axis : {"X", "Y", "Z", "A", "C", "spindle"})
     launcher.start(fmt::format("drive {}", axis),
                    with({bin + "/vcnc-drive", "--machine", machine, "--bus", bus, "--truth", truth,
                          "--axis", axis, "--seed", seed},
-                        common));
+                        with(with(common, kept), standing)));
   launcher.start("probe", with({bin + "/vcnc-probe", "--machine", machine, "--bus", bus, "--truth",
                                 truth, "--seed", seed},
-                               common));
-  launcher.start("overtravel",
-                 with({bin + "/vcnc-overtravel", "--machine", machine, "--bus", bus}, common));
+                               with(common, standing)));
+  launcher.start("overtravel", with({bin + "/vcnc-overtravel", "--machine", machine, "--bus", bus},
+                                    with(common, kept)));
   std::vector<std::string> analysis{bin + "/vcnc-analysis", "--out", folder.path().string()};
   if (options.csv) analysis.push_back("--csv");
   if (!options.report) analysis.push_back("--no-report");
   launcher.start("analysis", analysis);
-  launcher.wait_all_ready(kReadyTimeoutMs);
+  const int patience_ms = static_cast<int>(std::lround(options.answer_timeout_s * 4e3));
+  launcher.wait_all_ready(
+      std::max(patience_ms, kLeastReadyTimeoutMs),
+      host_faults.empty() ? std::function<void()>() : [&] { host_faults.act(launcher); });
 }
 
 struct RunEnded {
   int nc_code = kExitFailure;
-  std::string failure;             ///< the cause; what follows from it is not told
-  std::vector<std::string> notes;  ///< "drive Y: came to rest ..."
+  std::string failure;              ///< the cause; what follows from it is not told
+  std::vector<std::string> notes;   ///< "drive Y: came to rest ..."
+  std::vector<std::string> struck;  ///< faults that have had an effect
 };
 
 /// Shows the progress until every process has ended; sees to it that they do.
 class Watch {
  public:
-  Watch(Launcher& launcher, const RunFolder& folder, const BusFaults& faults)
-      : launcher_(launcher), folder_(folder), host_faults_(faults) {}
+  /// `answer_timeout_s` is the NC unit's with a module; twice that is a module's with the NC unit.
+  Watch(Launcher& launcher, const RunFolder& folder, HostFaults& host_faults,
+        double answer_timeout_s)
+      : launcher_(launcher),
+        folder_(folder),
+        host_faults_(host_faults),
+        nc_patience_ms_(static_cast<int>(std::lround(answer_timeout_s * 3e3))) {}
 
   RunEnded until_all_ended() {
     const int step_ms = host_faults_.empty() ? 100 : 5;
     while (launcher_.running() > 0) {
       if (stop_requested() && !told_to_stop_) stop("stopping ...");
       host_faults_.act(launcher_);
+      if (ending_) launcher_.kill_stopped("analysis");  // whose stall may pass
+      watch_nc_unit(step_ms);
       const auto exited = launcher_.next(step_ms, [&](const std::string& text) {
         progress_.show(text);
         host_faults_.note(text);
@@ -184,10 +275,18 @@ class Watch {
         launcher_.kill_all();
       }
     }
-    return {nc_code_.value_or(kExitFailure), !failure_.empty() ? failure_ : consequence_, notes_};
+    return {nc_code_.value_or(kExitFailure), !failure_.empty() ? failure_ : consequence_, notes_,
+            struck_};
   }
 
  private:
+  /// Modules that wait for the first SYNC wait for ever; only from outside can be seen that the NC
+  /// unit is stopped.
+  void watch_nc_unit(int step_ms) {
+    nc_stopped_ms_ = !ending_ && launcher_.stopped("NC unit") ? nc_stopped_ms_ + step_ms : 0;
+    if (nc_stopped_ms_ > nc_patience_ms_) stop("the NC unit is stopped, ending ...");
+  }
+
   void stop(const char* what) {
     told_to_stop_ = ending_ = true;
     patience_ms_ = kStopTimeoutMs;
@@ -198,6 +297,7 @@ class Watch {
   void note(const Exited& exited) {
     const bool nc = exited.name == "NC unit";
     if (nc) nc_code_ = exited.code;
+    struck_.insert(struck_.end(), exited.struck.begin(), exited.struck.end());
     for (const std::string& text : exited.notes) notes_.push_back(exited.name + ": " + text);
     const bool dismissed = exited.name == "analysis" && dismissed_;
     const bool expected = exited.code == kExitOk || dismissed ||
@@ -228,14 +328,17 @@ class Watch {
   const RunFolder& folder_;
   ProgressLine progress_;
   std::optional<int> nc_code_;
-  HostFaults host_faults_;
+  HostFaults& host_faults_;
   std::string failure_, consequence_;
-  std::vector<std::string> notes_;
+  std::vector<std::string> notes_, struck_;
   bool told_to_stop_ = false, ending_ = false, dismissed_ = false;
   int patience_ms_ = 0;
+  int nc_stopped_ms_ = 0;
+  const int nc_patience_ms_;
 };
 
-int run_processes(const RunOptions& options, const BusFaults& faults, const RunFolder& folder) {
+int run_processes(const RunOptions& options, const BusFaults& faults, const RunFolder& folder,
+                  const Continuation& start) {
   SocketFolder sockets;
   std::string bus = options.bus;
   std::unique_ptr<Hub> hub;
@@ -247,18 +350,30 @@ int run_processes(const RunOptions& options, const BusFaults& faults, const RunF
   ::setenv("VCNC_DDS_TAG", fmt::format("vcnc-{}", ::getpid()).c_str(), 0);
 
   Launcher launcher;
-  start_modules(launcher, options, folder, bus, sockets.file("truth"));
+  HostFaults host_faults(faults, folder.path());
+  start_modules(launcher, options, folder, start, bus, sockets.file("truth"), host_faults);
   if (stop_requested()) return kExitInterrupted;
+  std::vector<std::string> mains{"--on-power-return", options.on_power_return};
+  if (start.folder) mains = with(mains, {"--memory", start.folder->path()});
+  if (options.resume) mains.push_back("--resume");
   launcher.start("NC unit",
                  with({program_directory() + "/vcnc-nc", "--machine", folder.machine_file(),
                        "--program", fs::absolute(options.program).string(), "--bus", bus, "--pace",
                        fmt::format("{}", options.pace), "--seed", std::to_string(options.seed)},
-                      common_options(options)));
+                      with(common_options(options), mains)));
 
-  const RunEnded ended = Watch(launcher, folder, faults).until_all_ended();
+  const RunEnded ended =
+      Watch(launcher, folder, host_faults, options.answer_timeout_s).until_all_ended();
   for (const std::string& note : ended.notes) std::cerr << "vcnc: " << note << '\n';
   folder.write_notes(ended.notes);
-  std::cout << text_of(folder.path() / "summary.txt");
+  // A program that was killed cannot tell what it has suffered.
+  BusFaults simulated;
+  if (host_faults.empty() && ended.failure.empty())
+    std::copy_if(faults.begin(), faults.end(), std::back_inserter(simulated),
+                 [](const BusFault& f) { return !f.of_host(); });
+  warn(never_struck(simulated, ended.struck));
+  warn(host_faults.not_begun());
+  std::cout << file_text(folder.path() / "summary.txt");
   if (ended.failure.empty()) return ended.nc_code;
   std::cerr << "vcnc: " << ended.failure << '\n';
   return kExitFailure;
@@ -266,20 +381,30 @@ int run_processes(const RunOptions& options, const BusFaults& faults, const RunF
 
 }  // namespace
 
-int run_command(const RunOptions& options) {
+int run_command(RunOptions options) {
   const Machine machine = load_machine(options.machine, options.assignments, options.injections);
   const std::unique_ptr<PieceParams> piece = piece_of(machine);
-  Player(options.program,
-         as_nc_believes(machine));  // refuses a wrong program before anything is started or written
+  // Refuses a wrong program before anything is started or written.
+  Player player(options.program, as_nc_believes(machine));
+  if (options.random_faults > 0)
+    for (std::string& fault : drawn_faults(options, player)) {
+      std::cerr << "vcnc: --fault \"" << fault << "\"\n";
+      options.faults.push_back(std::move(fault));
+    }
   const BusFaults faults = parse_faults(options.faults);
   const bool in_process = options.in_process || options.bus == "inproc://";
   if (!in_process && options.bus != "hub://") check_bus(options.bus);
+  const Continuation start = open_memory(options, machine, piece.get());
+  for (const std::string& idle : idle_effects(machine))
+    std::cerr << "vcnc: warning: " << idle << '\n';
   catch_stop_signals();
   RunFolder folder(options.out, {options.program, options.machine, machine.setup.piece});
   try {
     folder.write_inputs(machine, piece.get());
-    const int code = in_process ? run_in_process(options, machine, piece.get(), faults, folder)
-                                : run_processes(options, faults, folder);
+    folder.write_faults(options.faults);
+    const int code = in_process
+                         ? run_in_process(options, machine, piece.get(), faults, folder, start)
+                         : run_processes(options, faults, folder, start);
     folder.remove_if_without_results();
     if (fs::exists(folder.path() / "report.html"))
       std::cout << "report: " << (folder.path() / "report.html").string() << '\n';

@@ -14,6 +14,7 @@ struct RunOptions {
   std::vector<std::string> assignments;  ///< --set key=value
   std::vector<std::string> injections;   ///< --inject key=value
   std::vector<std::string> faults;       ///< --fault, in the text form of bus/fault.hpp
+  int random_faults = 0;                 ///< --random-faults: so many more, drawn from the seed
   double answer_timeout_s = 5;           ///< the NC unit's patience with a module, in host time
   std::string bus = "hub://";            ///< hub:// picks a path of its own
   double pace = 0;                       ///< times real time, 0 = free-running
@@ -22,9 +23,12 @@ struct RunOptions {
   bool in_process = false;
   bool csv = false;
   bool report = true;
+  std::string memory;  ///< folder of what the machine keeps while it is off; empty: none
+  std::string on_power_return = "end";
+  bool resume = false;  ///< go on with the program that was interrupted
 };
 
 /// Exit code of the program (apps/node_options.hpp). Throws InputError before anything is written.
-int run_command(const RunOptions& options);
+int run_command(RunOptions options);
 
 }  // namespace vcnc

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::array kFiles{"machine.toml", "piece.toml",    "recording.h5", "recording.h5.partial",
                             "summary.json", "summary.txt",   "report.html",  "rows.csv",
-                            "program.ngc",  "scenario.toml", "notes.txt"};
+                            "program.ngc",  "scenario.toml", "notes.txt",    "faults.txt"};
 
 /// First line of the machine file that a run leaves: the folder is ours.
 const std::string kMark = "# Written by vcnc run: the machine as it was run.\n";
@@ -32,6 +32,13 @@ void write_text(const fs::path& path, const std::string& text) {
   out << text;
   out.close();
   if (!out) throw InputError(path.string() + ": cannot be written");
+}
+
+/// No file without lines.
+void write_lines(const fs::path& path, const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += line + '\n';
+  if (!text.empty()) write_text(path, text);
 }
 
 }  // namespace
@@ -71,9 +78,11 @@ void RunFolder::write_inputs(const Machine& machine, const PieceParams* piece) {
 }
 
 void RunFolder::write_notes(const std::vector<std::string>& notes) const {
-  std::string text;
-  for (const std::string& note : notes) text += note + '\n';
-  if (!text.empty()) write_text(path_ / "notes.txt", text);
+  write_lines(path_ / "notes.txt", notes);
+}
+
+void RunFolder::write_faults(const std::vector<std::string>& faults) const {
+  write_lines(path_ / "faults.txt", faults);
 }
 
 bool RunFolder::has_recording() const {

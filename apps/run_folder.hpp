@@ -24,6 +24,9 @@ class RunFolder {
   /// notes.txt, a line each; no file without notes.
   void write_notes(const std::vector<std::string>& notes) const;
 
+  /// faults.txt, a line each; no file without faults.
+  void write_faults(const std::vector<std::string>& faults) const;
+
   const std::filesystem::path& path() const { return path_; }
   std::string machine_file() const { return (path_ / "machine.toml").string(); }
   std::string piece_file() const { return (path_ / "piece.toml").string(); }

@@ -5,6 +5,7 @@
 
 #include "apps/control_pipe.hpp"
 #include "apps/faults.hpp"
+#include "bus/canopen_device.hpp"
 #include "bus/run_node.hpp"
 #include "bus/transport.hpp"
 
@@ -24,9 +25,10 @@ void tell(const RunDown& alone, const ControlPipe& launcher) {
 
 }  // namespace
 
-int serve(Node& node, const NodeOptions& options) {
-  FaultedNode faulted(node, parse_faults(options.faults));
-  Node& module = faulted.harmless() ? node : faulted;
+int serve(Node& node, const NodeOptions& options, const std::function<std::string()>& last_word) {
+  CanopenDevice device(node);
+  FaultedNode faulted(device, parse_faults(options.faults));
+  Node& module = faulted.harmless() ? static_cast<Node&>(device) : faulted;
   const auto transport = open_transport(options.bus, node.id());
   const ControlPipe launcher(options.control_fd);
   launcher.ready();
@@ -35,8 +37,10 @@ int serve(Node& node, const NodeOptions& options) {
   const NodeExit exit =
       run_node(module, *transport,
                {.silence_timeout_ms = 2 * options.answer_timeout_ms, .run_down = &alone});
+  for (const std::string& fault : faulted.struck()) launcher.struck(fault);
   if (exit == NodeExit::stopped) return kExitOk;
   if (alone.cycles > 0) tell(alone, launcher);
+  if (const std::string word = last_word ? last_word() : ""; !word.empty()) launcher.note(word);
   std::cerr << "the bus is gone";
   return kExitBusGone;
 }

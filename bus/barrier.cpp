@@ -57,7 +57,12 @@ bool Barrier::note(Tick k, const Frame& frame) {
     return frame.id > base && frame.id < base + 128 ? static_cast<std::size_t>(frame.id - base) : 0;
   };
   if (const std::size_t id = node_of(kTokenBase)) {
-    if (expected_[id] && tokens_[id]) arrived_.set(id);
+    if (!expected_[id] || !tokens_[id]) return false;
+    arrived_.set(id);
+    std::uint32_t ns = 0;
+    for (std::size_t i = 0; i < std::min<std::size_t>(frame.len, 4); ++i)
+      ns |= std::uint32_t{frame.data[i]} << (8 * i);
+    wasted_ns_ += ns;
     return false;
   }
   for (const int base : {kEmcyBase, kStatusBase, kHeartbeatBase})
@@ -74,7 +79,10 @@ bool Barrier::note(Tick k, const Frame& frame) {
     arrived_.set(id);
   } else if (const auto heartbeat = decode_heartbeat(frame)) {
     const auto node = static_cast<std::size_t>(heartbeat->node);
-    if (!expected_[node]) return true;
+    // Of a module with faults the frame may be spoiled: that is for the master to judge.
+    if (!expected_[node] || tokens_[node]) return true;
+    if (heartbeat->state == NmtState::pre_operational)
+      lose(k, node, fmt::format("{} went pre-operational in cycle {}", name(heartbeat->node), k));
     if (heartbeat->state == NmtState::boot_up)
       lose(k, node, fmt::format("{} restarted in cycle {}", name(heartbeat->node), k));
     if (heartbeat->state == NmtState::stopped)
@@ -85,6 +93,7 @@ bool Barrier::note(Tick k, const Frame& frame) {
 
 bool Barrier::collect(Tick k, Frames& answers, int timeout_ms) {
   forget();
+  wasted_ns_ = 0;
   int waited_ms = 0;  // since the last frame that arrived
   while (!complete()) {
     if (is_set(stop_)) return false;

@@ -1,7 +1,7 @@
 // Waits until every module of the roster has answered, and names those that do not.
 //
-// A module that leaves, restarts, answers twice or stays silent is lost: it is never waited for
-// again and what it says from then on is dropped and counted. The others go on.
+// A module that leaves, restarts, leaves operation, answers twice or stays silent is lost: it is
+// never waited for again and what it says from then on is dropped and counted. The others go on.
 #pragma once
 
 #include <atomic>
@@ -21,6 +21,8 @@ struct RosterEntry {
   int id = 0;  ///< 1..127
   std::string name;
   bool token = false;  ///< ends its answers by a token: has faults in simulated time
+  /// What it must be (objects 1000h and 1018h); product code 0: not asked.
+  std::uint32_t device_type = 0, product_code = 0;
 };
 using Roster = std::vector<RosterEntry>;
 
@@ -50,6 +52,8 @@ class Barrier {
 
   const std::vector<LostNode>& lost() const { return lost_; }
   std::uint64_t late_frames() const { return late_frames_; }  ///< of lost nodes
+  /// Bus time that destroyed frames took in the cycle collected last [ns].
+  std::int64_t wasted_ns() const { return wasted_ns_; }
 
   /// Start-up: takes what arrives within timeout_ms and notes the nodes whose heartbeat shows this
   /// state; other frames are dropped. Throws BarrierError if the bus is closed or a node leaves it.
@@ -73,6 +77,7 @@ class Barrier {
   Ids expected_, arrived_, gone_, tokens_;
   std::vector<LostNode> lost_;
   std::uint64_t late_frames_ = 0;
+  std::int64_t wasted_ns_ = 0;
   Frames scratch_;
 };
 

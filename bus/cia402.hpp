@@ -23,6 +23,7 @@ inline constexpr std::uint16_t kDisableVoltage = 0x00, kQuickStop = 0x02, kShutd
 inline constexpr std::uint16_t kWarning = 0x80, kRemote = 0x200, kTargetReached = 0x400,
                                kInternalLimit = 0x800, kFollowsCommand = 0x1000,
                                kFollowingError = 0x2000;
+inline constexpr std::uint16_t kLocked = 0x4000;  ///< ours: the spindle's lock is latched
 
 /// State shown by a statusword (object 6041h).
 constexpr State state_of(std::uint16_t sw) {

@@ -7,41 +7,20 @@
 //
 // Text form, for command lines and files: NODE KIND key=value ...
 //   probe mute from_s=1.5 for_s=0.005
-//   NODE     drive X|Y|Z|A|C|spindle, probe, overtravel, NC unit, bus; for kill, stop and slow also
-//            analysis
-//   from_s   beginning [s] (0), for_s  duration [s] (to the end)
-//
-//   kind          of       means
-//   mute          any      sends nothing, hears nothing: unplugged, bus off
-//   silent        any      sends nothing
-//   deaf          any      hears nothing
-//   drop          any      the frame id=0x187 is lost: sent by the node, or heard by it
-//   corrupt       any      bits of a payload flip unnoticed by the CRC: bit=N, else 1..3 bits drawn
-//                          from cycle and identifier; id=: sent or heard, else all that it sends
-//   delay         any      cycles=N: comes N cycles later; id= as above
-//   duplicate     any      comes twice; id= as above
-//   lose_sync     modules  no SYNC: nothing latched, no cyclic frame; the motion goes on;
-//   emergencies
-//                          are sent. On its return the missed SYNCs are told (EMCY 8100h)
-//   babble        any      frames=N (20) more frames in each cycle, of id=0x07F
-//   stuck         bus      stuck dominant: no module is heard and none hears
-//   encoder_jump  axes     um=, urad= added to what the measuring system counts
-//   fault         axes     the drive raises EMCY 2310h and stops by itself
-//   wire_break, stuck_adc, saturated
-//                 probe    channel=x|y|z (x): both signals at mid voltage, converter frozen, at its
-//                          end
-//   kill, stop, slow       of the host, on real processes: SIGKILL, SIGSTOP, stopped half of the
-//                          time; at from_s or, in host time, at wall_s
+// The table of kinds, what each may befall and its keys is kKinds in bus/fault.cpp; `vcnc faults`
+// prints it (docs/faults.md).
 //
 // `bus` stands for all modules; drop, corrupt, delay and duplicate act once, at the sender, there.
 // The NC unit silent or mute: no command and no SYNC reaches a module.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "bus/error_counters.hpp"
 #include "bus/node.hpp"
 
 namespace vcnc {
@@ -58,38 +37,75 @@ struct BusFault {
     lose_sync,
     babble,
     stuck,
+    power_loss,
+    bus_off,
     encoder_jump,
     fault,
     wire_break,
     stuck_adc,
     saturated,
+    slip,
     kill,
     stop,
-    slow
+    slow,
+    restart,
+    disk_full
   };
   std::string node;
   Kind kind = Kind::mute;
   Tick from = 0;
-  Tick cycles = 0;     ///< 0: to the end
-  int id = -1;         ///< identifier it is about, -1: all that the node sends
-  int count = 0;       ///< cycles of a delay, frames of a babbler
-  int bit = -1;        ///< that flips, -1: drawn
-  int channel = 0;     ///< of the probe
-  double value = 0;    ///< encoder jump [m or rad]
-  double wall_s = -1;  ///< faults of the host: when in host time, -1: by simulated time
-  std::string text{};  ///< as it was written
+  Tick cycles = 0;          ///< 0: to the end
+  int id = -1;              ///< identifier it is about, -1: all that the node sends
+  int count = 0;            ///< cycles of a delay, frames of a babbler, periods of a slip
+  int bit = -1;             ///< that flips, -1: drawn
+  int channel = 0;          ///< of the probe
+  double value = 0;         ///< encoder jump [m or rad]
+  double wall_s = -1;       ///< faults of the host: when in host time, -1: by simulated time
+  bool at_contact = false;  ///< `from` counts from the first touch; resolved before a run
+  std::string text{};       ///< as it was written
 
   bool active(Tick k) const { return k >= from && (cycles == 0 || k - from < cycles); }
   bool of_host() const { return kind >= Kind::kill; }
+  bool of_supply() const { return kind == Kind::power_loss; }
   bool of_module() const { return kind >= Kind::encoder_jump && kind < Kind::kill; }
 };
 
 using BusFaults = std::vector<BusFault>;
 
-inline constexpr std::string_view kNcUnitName = "NC unit", kWholeBus = "bus";
+inline constexpr std::string_view kNcUnitName = "NC unit", kWholeBus = "bus",
+                                  kSupplyName = "supply";
+
+/// What a kind may befall.
+enum class FaultPlace {
+  node,
+  module_or_bus,
+  one_node,
+  module,
+  bus,
+  supply,
+  axis,
+  probe,
+  process,
+  analysis
+};
+
+struct FaultKind {
+  BusFault::Kind kind;
+  std::string_view name;
+  std::string_view keys;  ///< besides from_s and for_s, separated by blanks
+  FaultPlace place;
+  std::string_view means;     ///< to the machine
+  std::string_view detected;  ///< what the machine makes of it
+};
+
+std::span<const FaultKind> fault_kinds();
+/// The nodes that a kind may befall, for people and for draws.
+std::vector<std::string_view> nodes_of(const FaultKind& kind);
 
 /// Throws std::invalid_argument: one sentence with the word that is wrong and what is allowed.
 BusFault parse_fault(std::string_view text);
+/// parse_fault(text_of(x)) gives x, whatever x.text was.
+std::string text_of(const BusFault& fault);
 
 /// Whether the simulated fault touches the module of this name.
 bool concerns(const BusFault& fault, std::string_view node);
@@ -102,9 +118,15 @@ class FaultFilter {
   FaultFilter(const BusFaults& faults, std::string_view node);
 
   const BusFaults& faults() const { return faults_; }
+  /// Those that have changed anything so far, as they were written.
+  std::vector<std::string> struck() const;
   bool empty() const { return faults_.empty(); }
   bool synced(Tick k) const;      ///< it gets SYNC
   bool speechless(Tick k) const;  ///< it can send nothing at all
+  /// Bus time that destroyed frames and error frames took in the last cycle [ns].
+  std::int64_t wasted_ns() const { return wasted_ns_; }
+  /// The emergency of a node that can speak again after errors, once.
+  std::optional<std::uint16_t> take_return(Tick k);
   /// The frames of `inputs` that it hears in cycle k, in CAN-ID order.
   void hear(Tick k, std::span<const Frame> inputs, Frames& heard);
   /// Appends to `out` what becomes of the frames that it says in cycle k.
@@ -120,10 +142,19 @@ class FaultFilter {
   bool is(Tick k, BusFault::Kind kind) const;
   void pass(Tick k, Way way, Frame frame, Frames& to);
   void release(Tick k, Way way, Frames& to);
+  void strike_whole(Tick k);
+
+  bool off() const { return counters_.state() == ErrorCounters::State::bus_off; }
+  /// What destroying does to the node's controller in cycle k. False: nothing gets through.
+  bool transmit(Tick k, std::span<const Frame> said);
 
   std::string node_;
   BusFaults faults_;
+  std::vector<char> struck_;  ///< by fault
   std::vector<Held> held_;
+  ErrorCounters counters_;
+  std::optional<std::uint16_t> return_;  ///< to be told when it can speak again
+  std::int64_t wasted_ns_ = 0;
 };
 
 /// A module with faults. Pure, like the one inside.
@@ -138,9 +169,14 @@ class FaultedNode : public Node {
   void step(Tick k, std::span<const Frame> inputs, Frames& out) override;
   bool at_rest() const override { return inner_.at_rest(); }
   void leave_bus() override { inner_.leave_bus(); }
+  bool watches(int node) const override { return inner_.watches(node); }
+  void request(const Frame& frame, Frames& out) override { inner_.request(frame, out); }
+  void note(const Emergency& emergency) override { inner_.note(emergency); }
   bool faulted() const override { return true; }
   bool speechless() const override { return speechless_; }
+  std::int64_t wasted_ns() const override { return filter_.wasted_ns(); }
   bool harmless() const { return filter_.empty(); }  ///< no fault concerns it
+  std::vector<std::string> struck() const { return filter_.struck(); }
 
  private:
   Node& inner_;
@@ -158,6 +194,7 @@ class FaultedMaster : public Master {
   bool step(Tick k, std::span<const Frame> answers, Frames& out) override;
   void cycle_load(double share) override { inner_.cycle_load(share); }
   void node_lost(int id, const std::string& why) override { inner_.node_lost(id, why); }
+  std::vector<std::string> struck() const { return filter_.struck(); }
 
  private:
   Master& inner_;

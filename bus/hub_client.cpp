@@ -22,7 +22,10 @@ void set_timeout(int fd, int timeout_ms) {
   ::setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &time, sizeof time);
 }
 
-bool is_sync_or_nmt(const Frame& frame) { return frame.id == kSyncId || frame.id == kNmtId; }
+/// Sent at once, with what was kept back for it.
+bool is_answered(const Frame& frame) {
+  return frame.id == kSyncId || frame.id == kNmtId || is_sdo(frame.id);
+}
 
 }  // namespace
 
@@ -61,7 +64,7 @@ void HubTransport::send(std::span<const Frame> slot) {
     throw BusError(fmt::format("a slot of {} bytes is too large for the hub: {} are allowed",
                                outgoing_.size(), kLargestSlot));
   if (outgoing_.empty()) return;
-  if (master_ && std::none_of(slot.begin(), slot.end(), is_sync_or_nmt)) return;
+  if (master_ && std::none_of(slot.begin(), slot.end(), is_answered)) return;
   ssize_t sent;
   do {
     sent = ::send(fd_.get(), outgoing_.data(), outgoing_.size(), MSG_NOSIGNAL);

@@ -8,10 +8,11 @@
 //   log       the frames of cycle k by identifier: trace hash, bus load, taps
 //
 // Before that, start-up: NMT "reset communication" every 200 ms until every node of the roster has
-// sent its boot-up message, then NMT "start" until every node says that it is operational. Whatever
-// a node sent before lies in front of that answer, so cycle 0 begins with an empty bus. The roster
-// is then frozen: a node that restarts, answers twice, leaves or stays silent is lost. The master
-// is told, the cycle goes on without it until the master has brought the machine to rest, for
+// sent its boot-up message; then each is asked by SDO what it is (1000h, 1018h), and a wrong one is
+// refused by name; then NMT "start" until every node says that it is operational. Whatever a node
+// sent before lies in front of that answer, so cycle 0 begins with an empty bus. The roster is then
+// frozen: a node that restarts, answers twice, leaves or stays silent is lost. The master is told,
+// the cycle goes on without it until the master has brought the machine to rest, for
 // degraded_cycles at most, and the run has failed. After the last cycle, whatever the reason, NMT
 // "stop".
 #pragma once

@@ -99,6 +99,15 @@ constexpr std::array<Field<OvertravelState>, 4> kOvertravelState{{
     {"cause", "", 3, 1, false, kCount, VCNC_INTEGER(OvertravelState, cause)},
     {"deflection", "m", 4, 4, true, kLength, VCNC_NUMBER(OvertravelState, deflection)},
 }};
+constexpr std::array<Field<SdoMessage>, 7> kSdo{{
+    {"command", "", 0, 1, false, kCount, VCNC_INTEGER(SdoMessage, command)},
+    {"index", "", 1, 2, false, kCount, VCNC_INTEGER(SdoMessage, index)},
+    {"sub_index", "", 3, 1, false, kCount, VCNC_INTEGER(SdoMessage, sub)},
+    {"data_0", "", 4, 1, false, kCount, VCNC_INTEGER(SdoMessage, data[0])},
+    {"data_1", "", 5, 1, false, kCount, VCNC_INTEGER(SdoMessage, data[1])},
+    {"data_2", "", 6, 1, false, kCount, VCNC_INTEGER(SdoMessage, data[2])},
+    {"data_3", "", 7, 1, false, kCount, VCNC_INTEGER(SdoMessage, data[3])},
+}};
 
 // clang-format on
 #undef VCNC_INTEGER
@@ -106,7 +115,7 @@ constexpr std::array<Field<OvertravelState>, 4> kOvertravelState{{
 
 constexpr std::uint8_t kNmtLength = 2, kSyncLength = 1, kHeartbeatLength = 1, kEmergencyLength = 8,
                        kGroupCommandLength = 64, kDriveStatusLength = 16, kProbeSampleLength = 32,
-                       kOvertravelLength = 8;
+                       kOvertravelLength = 8, kSdoLength = 8;
 constexpr std::uint16_t kProbeId = kStatusBase + kProbeNode,
                         kOvertravelId = kStatusBase + kOvertravelNode;
 
@@ -127,6 +136,20 @@ int node_of(const Frame& frame, int base, int last) {
 bool fits(const Frame& frame, int id, int len) { return frame.id == id && frame.len == len; }
 
 }  // namespace
+
+std::string_view text_of(NmtState state) {
+  switch (state) {
+    case NmtState::boot_up:
+      return "boot-up";
+    case NmtState::stopped:
+      return "stopped";
+    case NmtState::operational:
+      return "operational";
+    case NmtState::pre_operational:
+      return "pre-operational";
+  }
+  return "unknown";
+}
 
 Frame encode(const Nmt& m) {
   Frame frame = blank(kNmtId, kNmtLength, false);
@@ -170,6 +193,32 @@ Frame encode(const OvertravelState& m) {
   Frame frame = blank(kOvertravelId, kOvertravelLength, true);
   wire::put_all<kOvertravelState>(m, frame);
   return frame;
+}
+
+namespace {
+
+Frame encode_sdo(const SdoMessage& m, int base) {
+  Frame frame = blank(base + std::clamp(m.node, 1, 127), kSdoLength, false);
+  wire::put_all<kSdo>(m, frame);
+  return frame;
+}
+std::optional<SdoMessage> decode_sdo(const Frame& frame, int base) {
+  SdoMessage m;
+  m.node = node_of(frame, base, 127);
+  if (m.node == 0 || frame.len != kSdoLength) return std::nullopt;
+  wire::take_all<kSdo>(frame, m);
+  return m;
+}
+
+}  // namespace
+
+Frame encode_sdo_request(const SdoMessage& m) { return encode_sdo(m, kSdoRequestBase); }
+Frame encode_sdo_answer(const SdoMessage& m) { return encode_sdo(m, kSdoAnswerBase); }
+std::optional<SdoMessage> decode_sdo_request(const Frame& frame) {
+  return decode_sdo(frame, kSdoRequestBase);
+}
+std::optional<SdoMessage> decode_sdo_answer(const Frame& frame) {
+  return decode_sdo(frame, kSdoAnswerBase);
 }
 
 std::optional<Nmt> decode_nmt(const Frame& frame) {
@@ -288,7 +337,13 @@ std::vector<WireMessage> wire_messages() {
        kOvertravelLength, true, listed(kOvertravelState)},
       {"GroupCommand", "NC unit", kCommandId, 0, 0, kGroupCommandLength, true,
        listed(kGroupCommand)},
+      {"SdoAnswer", "every node", kSdoAnswerBase, 1, kOvertravelNode, kSdoLength, false,
+       listed(kSdo)},
+      {"SdoRequest", "NC unit or a tool, to every node", kSdoRequestBase, 1, kOvertravelNode,
+       kSdoLength, false, listed(kSdo), true},
       {"Heartbeat", "every node", kHeartbeatBase, 1, kOvertravelNode, kHeartbeatLength, false,
+       listed(kHeartbeat)},
+      {"NcHeartbeat", "NC unit", kHeartbeatBase + kNcNode, 0, 0, kHeartbeatLength, false,
        listed(kHeartbeat)},
   };
 }

@@ -15,7 +15,9 @@
 //   187       probe       32     ProbeSample
 //   188       overtravel  8      OvertravelState
 //   200       NC unit     64     GroupCommand
-//   700+id    any         1      heartbeat, boot-up
+//   580+id    modules     8      SDO answer
+//   600+id    any client  8      SDO request
+//   700+id    any         1      heartbeat, boot-up (77F: NC unit)
 //
 // 780h+id is a token of the simulation, not of the simulated bus: a module with faults in simulated
 // time (bus/fault.hpp) ends its answer with it, so that the barrier knows that it has stepped even
@@ -25,6 +27,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 
 #include "bus/frame.hpp"
 #include "bus/tick.hpp"
@@ -33,10 +36,16 @@ namespace vcnc {
 
 // ------------------------------------------------------------------ identifiers (CiA 301)
 inline constexpr std::uint16_t kNmtId = 0x000, kSyncId = 0x080, kEmcyBase = 0x080,
-                               kStatusBase = 0x180, kCommandId = 0x200, kHeartbeatBase = 0x700,
-                               kTokenBase = 0x780;
-inline constexpr int kSpindleNode = 6, kProbeNode = 7, kOvertravelNode = 8;
+                               kStatusBase = 0x180, kCommandId = 0x200, kSdoAnswerBase = 0x580,
+                               kSdoRequestBase = 0x600, kHeartbeatBase = 0x700, kTokenBase = 0x780;
+inline constexpr int kSpindleNode = 6, kProbeNode = 7, kOvertravelNode = 8, kNcNode = 127;
+constexpr bool is_sdo(std::uint16_t id) { return id > kSdoAnswerBase && id < kHeartbeatBase; }
 constexpr int drive_node(std::size_t axis) { return static_cast<int>(axis) + 1; }
+
+/// What the modules are: device types (1000h; 0: no standard profile) and product codes (1018h).
+inline constexpr std::uint32_t kServoDrive = 0x00020192, kSpindleDrive = 0x00010192, kNoProfile = 0;
+inline constexpr std::uint32_t kAxisDriveProduct = 1, kSpindleDriveProduct = 2, kProbeProduct = 3,
+                               kOvertravelProduct = 4;
 
 enum class NmtCommand : std::uint8_t {
   start = 0x01,
@@ -51,6 +60,8 @@ enum class NmtState : std::uint8_t {
   operational = 0x05,
   pre_operational = 0x7f
 };
+
+std::string_view text_of(NmtState state);
 
 struct Nmt {
   NmtCommand command = NmtCommand::start;
@@ -68,6 +79,14 @@ struct Emergency {
   std::uint16_t code = 0;  ///< CiA 301/402 error code
   std::uint8_t error_register = 0;
   std::array<std::uint8_t, 5> detail{};
+};
+/// SDO request or answer. In segments `index`, `sub` and `data` together are seven bytes of data.
+struct SdoMessage {
+  int node = 0;              ///< the server
+  std::uint8_t command = 0;  ///< specifier in the upper three bits
+  std::uint16_t index = 0;
+  std::uint8_t sub = 0;
+  std::array<std::uint8_t, 4> data{};
 };
 
 // ------------------------------------------------------------------ cyclic messages
@@ -91,7 +110,7 @@ struct GroupCommand {
   double spindle_speed = 0;  ///< [rad/s]
 };
 inline constexpr std::uint8_t kSpindleLock = 0x01;  ///< the NC unit asks the spindle drive to lock
-inline constexpr std::uint8_t kResetLatch = 0x02;   ///< operator's reset of latched protection
+inline constexpr std::uint8_t kResetLatch = 0x02;   ///< operator's reset, held for some cycles
 
 struct DriveStatus {
   int node = 0;
@@ -116,8 +135,11 @@ struct ProbeSample {
   std::array<std::uint16_t, 6> adc{};  ///< x cos, x sin, y cos, y sin, z cos, z sin
 };
 
-/// EMCY codes of the protocol (bus/node_shell.hpp says when).
-inline constexpr std::uint16_t kCommunicationError = 0x8100, kOverrunError = 0x8110;
+/// EMCY codes of the protocol (bus/emergency_codes.hpp says when).
+inline constexpr std::uint16_t kErrorReset = 0x0000, kCommunicationError = 0x8100,
+                               kOverrunError = 0x8110, kErrorPassive = 0x8120,
+                               kHeartbeatLost = 0x8130, kBusOffRecovered = 0x8140,
+                               kPdoLengthError = 0x8210;
 
 /// EMCY code with which the overtravel module tells that it has latched.
 inline constexpr std::uint16_t kOvertravelEmergency = 0xff10;
@@ -151,6 +173,8 @@ Frame encode(const GroupCommand&);
 Frame encode(const DriveStatus&);
 Frame encode(const ProbeSample&);
 Frame encode(const OvertravelState&);
+Frame encode_sdo_request(const SdoMessage&);
+Frame encode_sdo_answer(const SdoMessage&);
 
 std::optional<Nmt> decode_nmt(const Frame&);
 std::optional<Sync> decode_sync(const Frame&);
@@ -160,6 +184,8 @@ std::optional<GroupCommand> decode_group_command(const Frame&);
 std::optional<DriveStatus> decode_drive_status(const Frame&);
 std::optional<ProbeSample> decode_probe_sample(const Frame&);
 std::optional<OvertravelState> decode_overtravel_state(const Frame&);
+std::optional<SdoMessage> decode_sdo_request(const Frame&);
+std::optional<SdoMessage> decode_sdo_answer(const Frame&);
 
 /// Whether every value is a number. A receiver that acts upon values takes a frame in which one is
 /// none for lost: a single flipped bit can turn zero into "not a number".

@@ -16,14 +16,23 @@
 namespace vcnc {
 
 struct BusFault;
+struct Emergency;
+class ObjectDictionary;
+
+/// What a module says it is, and how often that it lives.
+struct DeviceProfile {
+  std::uint32_t device_type = 0;   ///< object 1000h; 0: it follows no standard profile
+  std::uint32_t product_code = 0;  ///< object 1018h
+  Tick heartbeat = 0;              ///< producer period [cycles], 0: none
+};
 
 class Node {
  public:
   virtual ~Node() = default;
   virtual int id() const = 0;                 ///< CANopen node id, 1..127
   virtual std::string_view name() const = 0;  ///< for people: "drive X", "probe"
-  /// Acceptance filter; asked once for every identifier, so it must not change. NMT, SYNC and
-  /// heartbeats never reach a node: NodeShell handles them.
+  /// Acceptance filter; asked once for every identifier, so it must not change. NMT and SYNC
+  /// never reach a node, NodeShell handles them; heartbeats only those that it watches.
   virtual bool accepts(std::uint16_t cob_id) const = 0;
   /// One cycle. `inputs` are the accepted frames of cycle k-1 in CAN-ID order; answers are appended
   /// to `out` and must begin with the node's cyclic frame (COB-ID 180h + id).
@@ -33,6 +42,19 @@ class Node {
   /// Told once when the bus has ended: from now on nobody listens, on no channel.
   virtual void leave_bus() {}
 
+  // As a CANopen device (bus/canopen_device.hpp).
+  virtual DeviceProfile profile() const { return {}; }
+  /// Adds the objects of its own. Their functions are called between steps, as long as it lives.
+  virtual void declare(ObjectDictionary&) {}
+  /// Told before the step: the heartbeat of the NC unit has been lost, or is back.
+  virtual void nc_unit_lost(bool /*lost*/) {}
+  /// Whether heartbeats of that node are handed to step().
+  virtual bool watches(int /*node*/) const { return false; }
+  /// A frame for it between cycles (SDO in pre-operational).
+  virtual void request(const Frame&, Frames& /*out*/) {}
+  /// An emergency has been sent in its name by the protocol.
+  virtual void note(const Emergency&) {}
+
   // Faults in simulated time (bus/fault.hpp).
   /// A fault of the module's own for the next step; called before each in which it is active.
   virtual void suffer(const BusFault&) {}
@@ -40,6 +62,8 @@ class Node {
   virtual bool faulted() const { return false; }
   /// It could send nothing in the last cycle.
   virtual bool speechless() const { return false; }
+  /// Bus time that its destroyed frames took in the last cycle [ns].
+  virtual std::int64_t wasted_ns() const { return 0; }
 };
 
 /// The one module that drives the cycle (the NC unit).

@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kSyncPeriod = 240;  // the counter runs 1..240
 
-/// PDOs come once per cycle and sender; emergencies may come several times.
-bool is_cyclic(std::uint16_t id) { return id >= kStatusBase && id < kHeartbeatBase; }
+/// PDOs come once per cycle and sender; emergencies and requests may come several times.
+bool is_cyclic(std::uint16_t id) { return id >= kStatusBase && id < kSdoAnswerBase; }
 
 }  // namespace
 
@@ -20,6 +20,8 @@ NodeShell::NodeShell(Node& node) : node_(node) {
     throw std::invalid_argument("node id " + std::to_string(node.id()) + " of " +
                                 std::string(node.name()) + ": allowed is 1..127");
   for (std::uint16_t id = kSyncId + 1; id < kHeartbeatBase; ++id) accepted_[id] = node.accepts(id);
+  for (int other = 1; other <= 127; ++other)
+    accepted_[static_cast<std::size_t>(kHeartbeatBase + other)] = node.watches(other);
   constexpr std::size_t kExpectedFrames = 32;
   arriving_.reserve(kExpectedFrames);
   inputs_.reserve(kExpectedFrames);
@@ -27,6 +29,7 @@ NodeShell::NodeShell(Node& node) : node_(node) {
 
 void NodeShell::boot(Frames& out) {
   state_ = NmtState::pre_operational;
+  started_ = false;
   arriving_.clear();
   out.push_back(encode(Heartbeat{node_.id(), NmtState::boot_up}));
 }
@@ -36,8 +39,11 @@ void NodeShell::feed(const Frame& frame, Frames& out) {
     if (const auto sync = decode_sync(frame)) on_sync(*sync, out);
   } else if (frame.id == kNmtId) {
     if (const auto nmt = decode_nmt(frame)) on_nmt(*nmt, out);
-  } else if (frame.id < accepted_.size() && accepted_[frame.id] &&
-             state_ == NmtState::operational) {
+  } else if (frame.id >= accepted_.size() || !accepted_[frame.id]) {
+    return;
+  } else if (state_ == NmtState::pre_operational && frame.id == kSdoRequestBase + node_.id()) {
+    node_.request(frame, out);
+  } else if (state_ == NmtState::operational) {
     if (arriving_.size() == kMostFrames) {
       ++surplus_;
       return;
@@ -56,6 +62,7 @@ void NodeShell::on_nmt(const Nmt& nmt, Frames& out) {
       if (state_ == NmtState::operational) return;
       state_ = NmtState::operational;
       next_tick_ = 0;
+      started_ = true;
       arriving_.clear();
       fault_count_ = {};
       surplus_ = 0;
@@ -66,7 +73,10 @@ void NodeShell::on_nmt(const Nmt& nmt, Frames& out) {
       state_ = NmtState::stopped;
       return;
     case NmtCommand::preop:
+      if (state_ == NmtState::pre_operational) return;
       state_ = NmtState::pre_operational;
+      arriving_.clear();
+      out.push_back(encode(Heartbeat{node_.id(), state_}));
       return;
     case NmtCommand::reset_node:
     case NmtCommand::reset_comm:
@@ -76,6 +86,7 @@ void NodeShell::on_nmt(const Nmt& nmt, Frames& out) {
 }
 
 void NodeShell::on_sync(const Sync& sync, Frames& out) {
+  if (state_ == NmtState::pre_operational && started_) return stand_by(out);
   if (state_ != NmtState::operational) return;
   const int ahead = (sync.counter - sync_counter(next_tick_) + kSyncPeriod) % kSyncPeriod;
   if (ahead == kSyncPeriod - 1) {  // the previous one again: this cycle has been stepped already
@@ -95,6 +106,11 @@ void NodeShell::on_sync(const Sync& sync, Frames& out) {
     if (!node_.speechless()) report_faults(out);
     Frame& token = out.emplace_back();
     token.id = static_cast<std::uint16_t>(kTokenBase + node_.id());
+    if (const auto wasted = static_cast<std::uint64_t>(node_.wasted_ns()); wasted > 0) {
+      token.len = 4;
+      for (std::size_t i = 0; i < 4; ++i)
+        token.data[i] = static_cast<std::uint8_t>(wasted >> (8 * i));
+    }
     return;
   }
   if (out.size() == first || out[first].id != kStatusBase + node_.id())
@@ -103,6 +119,20 @@ void NodeShell::on_sync(const Sync& sync, Frames& out) {
   report_faults(out);
   std::rotate(out.begin() + static_cast<std::ptrdiff_t>(first),
               out.begin() + static_cast<std::ptrdiff_t>(first) + 1, out.end());
+}
+
+/// Time goes on for a module that has been taken out of operation, but it hears no PDO and sends
+/// none.
+void NodeShell::stand_by(Frames& out) {
+  const std::size_t first = out.size();
+  node_.step(next_tick_++, {}, out);
+  std::size_t kept = first;
+  for (std::size_t i = first; i < out.size(); ++i) {
+    const bool heartbeat = out[i].id == kHeartbeatBase + node_.id();
+    if (!heartbeat && out[i].id != kEmcyBase + node_.id()) continue;
+    out[kept++] = heartbeat ? encode(Heartbeat{node_.id(), state_}) : out[i];
+  }
+  out.resize(kept);
 }
 
 void NodeShell::report_faults(Frames& out) {
@@ -117,6 +147,7 @@ void NodeShell::report_faults(Frames& out) {
     for (std::size_t byte = 0; byte < 4; ++byte)
       emergency.detail[byte + 1] = static_cast<std::uint8_t>(fault_count_[fault] >> (8 * byte));
     out.push_back(encode(emergency));
+    node_.note(emergency);
   }
 }
 

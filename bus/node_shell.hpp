@@ -2,11 +2,15 @@
 //
 //   NMT reset    -> boot-up message (700h+id, 00); inputs are dropped
 //   NMT start    -> heartbeat "operational" (05); the next SYNC is tick 0
+//   NMT preop    -> heartbeat "pre-operational" (7F). Inputs and PDOs stop, time does not: with
+//                   each SYNC the node is stepped, and its emergencies and heartbeats are sent
 //   NMT stop     -> over() becomes true
+//   SDO request  -> answered at once in pre-operational; in operation an input like others
 //   SYNC(k)      -> the frames accepted since SYNC(k-1) are handed to Node::step in CAN-ID order;
 //                   its answers follow, the cyclic frame (180h+id) last, so that whoever has
 //                   received that one has received them all. A module with faults in simulated
-//                   time may say less; a token (780h+id) ends its answer instead
+//                   time may say less; a token (780h+id) ends its answer instead, which also
+//                   tells the bus time that its destroyed frames took [ns, 32 bit]
 //
 // The SYNC counter 1..240 is unwrapped to a 64-bit tick. A SYNC that is missing or comes twice, a
 // second cyclic frame of one sender in a cycle, and frames lost by the host are counted, and the
@@ -53,11 +57,13 @@ class NodeShell {
 
   void on_nmt(const Nmt& nmt, Frames& out);
   void on_sync(const Sync& sync, Frames& out);
+  void stand_by(Frames& out);
   void report_faults(Frames& out);
 
   Node& node_;
   std::bitset<2048> accepted_;
   NmtState state_ = NmtState::boot_up;
+  bool started_ = false;  ///< since the last reset
   Tick next_tick_ = 0;
   Frames arriving_;  ///< since the last SYNC
   Frames inputs_;    ///< of the cycle being stepped

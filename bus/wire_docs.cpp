@@ -30,15 +30,18 @@ std::string identifiers(const WireMessage& m) {
 }
 
 void append_message(std::string& text, const WireMessage& m, int node) {
-  const std::string sender = dbc_node(node);
+  const std::string named = dbc_node(node);
   const bool several = m.first_node != m.last_node;
   text += fmt::format("BO_ {} {}{}: {} {}\n", m.base + node, m.name,
-                      several ? fmt::format("_{}", sender) : "", m.length, sender);
+                      several ? fmt::format("_{}", named) : "", m.length,
+                      m.to_node ? dbc_node(0) : named);
   for (const WireField& f : m.fields)
     text += fmt::format(" SG_ {} : {}|{}@1{} ({:.10g},0) [{:.10g}|{:.10g}] \"{}\" {}\n", f.name,
                         8 * f.offset, 8 * f.bytes, f.is_signed ? '-' : '+', 1 / f.per_unit,
                         f.is_signed ? -largest(f) : 0, largest(f), f.unit,
-                        node == 0 ? "X,Y,Z,A,C,Spindle,Probe,Overtravel" : "NcUnit");
+                        node == 0   ? "X,Y,Z,A,C,Spindle,Probe,Overtravel"
+                        : m.to_node ? named
+                                    : "NcUnit");
   text += '\n';
 }
 

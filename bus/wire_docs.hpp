@@ -23,6 +23,7 @@ struct WireMessage {
   int length = 0;
   bool fd = false;
   std::vector<WireField> fields;
+  bool to_node = false;  ///< from the NC unit to the node in the identifier
 };
 
 /// Every message on the bus, from the tables the codecs use.

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <initializer_list>
+#include <limits>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -180,7 +181,9 @@ class Reader {
   static double number(const toml::node& n, const std::string& key, Unit u, Range r) {
     const auto value = n.value<double>();
     if (!value || !n.is_number())
-      fail(n, key, fmt::format("expected a number{}{}", u.suffix.empty() ? "" : " in ", u.suffix));
+      fail(n, key,
+           fmt::format("expected a number{}{}, {} .. {}", u.suffix.empty() ? "" : " in ", u.suffix,
+                       r.min, r.max));
     if (!std::isfinite(*value)) fail(n, key, "expected a finite number");
     check_range(n, key, *value, u, r);
     return *value * u.to_si;
@@ -280,19 +283,32 @@ void merge(toml::table& into, toml::table&& from) {
   }
 }
 
+/// KEY=VALUE of an option as a table; a value that is no TOML is a text. `name` is the option as it
+/// was given.
+toml::table parse_option(const std::string& key, const std::string& value,
+                         const std::string& name) {
+  refuse_deep_lines(key, name);
+  refuse_deep_lines(value, name);
+  try {
+    return toml::parse(key + "=" + value, name);
+  } catch (const toml::parse_error&) {
+  }
+  try {
+    return toml::parse(fmt::format("{} = '''{}'''", key, value), name);
+  } catch (const toml::parse_error&) {
+    throw ConfigError(fmt::format(
+        "{}: expected key=value with a key of words and points, and a number, true, false, a text "
+        "or a list as value",
+        name));
+  }
+}
+
 toml::table parse_assignment(const std::string& assignment) {
   const std::string name = "--set " + assignment;
   const std::size_t equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0)
     throw ConfigError(name + ": expected key=value, for example axes.Y.kv_per_s=38");
-  refuse_deep_lines(assignment, name);
-  try {
-    return toml::parse(assignment, name);
-  } catch (const toml::parse_error&) {  // a bare word is a text
-    return parse(
-        fmt::format("{} = '''{}'''", assignment.substr(0, equals), assignment.substr(equals + 1)),
-        name);
-  }
+  return parse_option(assignment.substr(0, equals), assignment.substr(equals + 1), name);
 }
 
 /// What single ranges cannot say, of the machine as it is written.
@@ -378,43 +394,92 @@ void refuse_wrong_place(const std::string& key, const std::vector<Parameter>& kn
   });
 }
 
-/// `--inject KEY=VALUE` as what it means: a key below [effects], or a deviation of a declared
-/// number.
-void inject(toml::table& table, const std::string& injection) {
-  const std::string name = "--inject " + injection;
-  const std::size_t equals = injection.find('=');
-  if (equals == std::string::npos || equals == 0)
-    throw ConfigError(name + ": expected key=value, for example Y.backlash.gap_um=12");
-  const std::string key = injection.substr(0, equals);
-  refuse_deep_lines(injection, name);
-  Machine plain;
-  const std::vector<Parameter> known = parameters(plain);
-  const auto number =
-      std::find_if(known.begin(), known.end(), [&](const Parameter& p) { return p.key == key; });
-  if (key.starts_with("effects.") || number == known.end()) {
-    refuse_wrong_place(key, known, name);
-    merge(table, parse(key.starts_with("effects.") ? injection : "effects." + injection, name));
-    return;
-  }
-  toml::table value;
-  try {
-    value = toml::parse("value = " + injection.substr(equals + 1), name);
-  } catch (const toml::parse_error&) {
-  }
-  const auto given = value["value"].value<double>();
-  if (!value["value"].is_number() || !std::isfinite(*given) || *given < number->range.min ||
-      *given > number->range.max)
-    throw ConfigError(fmt::format("{}: expected a number, {} .. {}{}{}", name, number->range.min,
-                                  number->range.max, number->unit.suffix.empty() ? "" : " ",
-                                  number->unit.suffix));
+/// Appends a number that is in truth another one.
+void add_deviation(toml::table& table, const Parameter& number, double value,
+                   const std::string& name) {
+  if (!(value >= number.range.min && value <= number.range.max))
+    throw ConfigError(fmt::format("{}: expected a number, {} .. {}{}{}", name, number.range.min,
+                                  number.range.max, number.unit.suffix.empty() ? "" : " ",
+                                  number.unit.suffix));
   toml::table deviation;
-  deviation.insert("key", key);
-  deviation.insert("value", *value["value"].value<double>());
+  deviation.insert("key", number.key);
+  deviation.insert("value", value);
   toml::table* effects = table.emplace<toml::table>("effects").first->second.as_table();
   toml::array* all =
       effects ? effects->emplace<toml::array>("deviation").first->second.as_array() : nullptr;
   if (!all) throw ConfigError(name + ": effects.deviation is not an array of tables in the file");
   all->push_back(std::move(deviation));
+}
+
+/// As a key below [effects].
+std::string below_effects(const std::string& key) {
+  return key.starts_with("effects.") ? key : "effects." + key;
+}
+
+/// The numbers that a value gives; NaN for what is no number.
+std::vector<double> numbers_of(const std::string& text, const std::string& name) {
+  const auto number = [](const toml::node& node) {
+    return node.is_number() ? *node.value<double>() : std::numeric_limits<double>::quiet_NaN();
+  };
+  const toml::table table = parse_option("value", text, name);
+  const toml::node& value = *table.get("value");
+  if (!value.is_array()) return {number(value)};
+  std::vector<double> result;
+  for (const toml::node& element : *value.as_array()) result.push_back(number(element));
+  return result;
+}
+
+/// `--inject KEY=VALUE` as what it means: a key below [effects], or a deviation of a declared
+/// number or vector.
+void inject(toml::table& table, const std::string& injection) {
+  const std::string name = "--inject " + injection;
+  const std::size_t equals = injection.find('=');
+  if (equals == std::string::npos || equals == 0)
+    throw ConfigError(name + ": expected key=value, for example Y.backlash.gap_um=12");
+  const std::string key = injection.substr(0, equals), text = injection.substr(equals + 1);
+  refuse_deep_lines(injection, name);
+  Machine plain;
+  const std::vector<Parameter> known = parameters(plain);
+  const auto find = [&](const std::string& wanted) {
+    return std::find_if(known.begin(), known.end(),
+                        [&](const Parameter& p) { return p.key == wanted; });
+  };
+  const auto number = find(key), vector = find(key + ".x");
+  const bool effect = key.starts_with("effects.");
+  if (!effect && number != known.end()) {
+    const std::vector<double> values = numbers_of(text, name);
+    add_deviation(table, *number,
+                  values.size() == 1 ? values[0] : std::numeric_limits<double>::quiet_NaN(), name);
+  } else if (!effect && vector != known.end()) {
+    const std::vector<double> values = numbers_of(text, name);
+    if (values.size() != 3)
+      throw ConfigError(fmt::format(
+          "{}: expected [x, y, z]{}{}, or one component: {}.x, {}.y, {}.z", name,
+          vector->unit.suffix.empty() ? "" : " in ", vector->unit.suffix, key, key, key));
+    for (std::size_t i = 0; i < 3; ++i)
+      add_deviation(table, *find(key + "." + "xyz"[i]), values[i], name);
+  } else {
+    refuse_wrong_place(key, known, name);
+    merge(table, parse_option(below_effects(key), text, name));
+  }
+}
+
+/// An effect that is both set and injected, or injected twice, has no one value.
+void refuse_doubles(const std::vector<std::string>& assignments,
+                    const std::vector<std::string>& injections) {
+  const auto key_of = [](const std::string& text) { return text.substr(0, text.find('=')); };
+  std::set<std::string> set, injected;
+  for (const std::string& assignment : assignments) set.insert(key_of(assignment));
+  for (const std::string& injection : injections) {
+    const std::string key = below_effects(key_of(injection));
+    if (!injected.insert(key).second)
+      throw ConfigError("--inject " + injection + ": the key is given twice");
+    if (set.contains(key))
+      throw ConfigError(
+          fmt::format("--inject {}: the same is given by --set {}; one of them is too "
+                      "many",
+                      injection, key));
+  }
 }
 
 }  // namespace
@@ -429,12 +494,8 @@ Machine load_machine(const std::string& path, const std::vector<std::string>& as
     if (one["setup"]["piece"].node()) base = fs::current_path();
     merge(table, std::move(one));
   }
-  std::set<std::string> injected;
-  for (const std::string& injection : injections) {
-    if (!injected.insert(injection.substr(0, injection.find('='))).second)
-      throw ConfigError("--inject " + injection + ": the key is given twice");
-    inject(table, injection);
-  }
+  refuse_doubles(assignments, injections);
+  for (const std::string& injection : injections) inject(table, injection);
   Machine machine = read<Machine>(table);
   check_whole(machine, path);
   if (!machine.setup.piece.empty()) {

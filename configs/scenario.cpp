@@ -72,6 +72,8 @@ void check_scenario(const Scenario& s, const std::string& name) {
                            to_string(s.kind)));
   if (!own && s.has_piece())
     fail(name, "piece: is for kind \"program\"; the other kinds choose theirs by target");
+  if (s.expect == Scenario::Expect::fault_safe && s.faults.empty())
+    fail(name, "expect: \"fault_safe\" needs faults");
   if (s.kind == Kind::scan && !(s.predeflection > 0))
     fail(name, "predeflection_mm: kind \"scan\" needs it, above 0");
   if (!own && s.kind != Kind::scan && s.predeflection >= s.depth)

@@ -29,12 +29,13 @@ struct Scenario {
   };
   enum class Target { plane, sphere, bore, piece };
   enum class Expect {
-    soft_stop,  ///< feed hold and retraction, no quick stop
-    hard,       ///< quick stop of all axes
-    trip,       ///< one of the two
-    safe,       ///< refused before anything moves, or tripped
-    refused,    ///< refused before anything moves
-    none        ///< no trip; the program comes to its end
+    soft_stop,   ///< feed hold and retraction, no quick stop
+    hard,        ///< quick stop of all axes
+    trip,        ///< one of the two
+    safe,        ///< refused before anything moves, or tripped
+    refused,     ///< refused before anything moves
+    fault_safe,  ///< with faults: safe whatever they are, see apps/lockout_fault.hpp
+    none         ///< no trip; the program comes to its end
   };
 
   std::string name;
@@ -95,11 +96,15 @@ struct Scenario {
                   {"trip", Expect::trip},
                   {"safe", Expect::safe},
                   {"refused", Expect::refused},
+                  {"fault_safe", Expect::fault_safe},
                   {"none", Expect::none}},
-                 "what the machine must do; trip: soft_stop or hard; safe: refused or trip");
+                 "what the machine must do; trip: soft_stop or hard; safe: refused or trip; "
+                 "fault_safe: whatever the faults allow");
     visit("program", p.program, "kind program: G-code file, relative to this file");
     visit("gcode", p.gcode, "kind program: the program itself");
-    visit("faults", p.faults, "not possible yet, must be empty; see vcnc run --fault");
+    visit("faults", p.faults,
+          "as of vcnc run --fault; at=contact lets from_s count from the first touch, e.g. "
+          "\"probe mute at=contact from_s=0.02\"");
     visit("within_limit", p.within_limit,
           "the deflection must stay below the probe's mechanical limit");
     visit("reading_error_um", p.reading_error, unit::um, Range{0.01, 1000},

@@ -6,6 +6,8 @@
 #include <array>
 #include <stdexcept>
 
+#include "bus/messages.hpp"
+
 namespace vcnc {
 namespace {
 
@@ -50,15 +52,19 @@ constexpr std::array kTexts{
     AlarmText{AlarmCode::drive_fault, "Drive fault",
               "the drive stopped by itself: overcurrent or another fault of its power stage",
               "look at the drive; check motor and cables; reset"},
-    AlarmText{AlarmCode::spindle_locked, "The spindle is locked",
-              "a start was asked for while the protection holds the spindle",
-              "clear the overtravel alarm first, then reset"},
+    AlarmText{
+        AlarmCode::spindle_locked, "The spindle is locked",
+        "a start was asked for while the protection holds the spindle, maybe since before the "
+        "machine was switched on",
+        "clear what has locked it first, then reset (`vcnc reset` where it is kept)"},
     AlarmText{AlarmCode::module_emergency, "A module raised an emergency",
               "an emergency message with a code that has no text of its own",
               "look up the code in CiA 301 or the module's manual"},
-    AlarmText{AlarmCode::communication_disturbed, "Communication disturbed",
-              "a module missed a SYNC, got one twice, or got two frames of one sender in a cycle",
-              "check cabling, bit rates and other participants of the bus"},
+    AlarmText{
+        AlarmCode::communication_disturbed, "Communication disturbed",
+        "a module missed a SYNC, got one twice, got two frames of one sender in a cycle or one of "
+        "wrong length, or was error passive or bus-off",
+        "check cabling, bit rates and other participants of the bus"},
     AlarmText{AlarmCode::frames_lost, "Frames lost by the host",
               "the host of a module could not take frames fast enough",
               "run slower (--pace), free the host of other work"},
@@ -75,6 +81,30 @@ constexpr std::array kTexts{
         "no valid and timely frame of it for more than two cycles: unplugged, bus off, or its "
         "frames are lost, late or spoiled; quick stop",
         "check cable, connector and supply of the module named"},
+    AlarmText{
+        AlarmCode::heartbeat_lost, "Heartbeat lost",
+        "a module did not show its heartbeat for three of its periods, showed another state than "
+        "operational, or does not hear that of the NC unit; quick stop",
+        "look whether somebody changed 1016h or 1017h or sent an NMT command; check the module "
+        "named"},
+    AlarmText{AlarmCode::mains_lost, "Mains lost",
+              "the supply's power-fail signal; feed hold, then the probe is retracted from what it "
+              "touches",
+              "none at once: the machine lives on its supply; see to the mains"},
+    AlarmText{AlarmCode::mains_back, "Mains are back", "the power-fail signal has gone",
+              "none; --on-power-return says whether the program ends or goes on"},
+    AlarmText{
+        AlarmCode::supply_exhausted, "Supply exhausted, everything is dark",
+        "the mains were away for longer than the store of the supply lasts; the alarm says "
+        "what had been reached by then",
+        "switch on again; with --memory the program goes on by --resume; if the probe still "
+        "touched, drive it off by hand first; a larger store if it was not retracted in time"},
+    AlarmText{AlarmCode::secured, "Held and retracted, waiting for the mains",
+              "after 4001: the axes stand, the probe is free, with --memory the state is saved",
+              "wait for the mains, or switch off and go on later by --resume"},
+    AlarmText{AlarmCode::resumed, "An interrupted program goes on",
+              "the mains came back with --on-power-return resume, or the run began with --resume",
+              "none; this run or the one before holds the other part of the path"},
 };
 
 }  // namespace
@@ -88,7 +118,7 @@ const AlarmText& alarm_text(AlarmCode code) {
   return *found;
 }
 
-AlarmCode alarm_of_emergency(std::uint16_t code) {
+AlarmCode alarm_of_emergency(std::uint16_t code, std::uint8_t detail) {
   switch (code) {
     case 0x8611:
       return AlarmCode::following_error;
@@ -96,13 +126,16 @@ AlarmCode alarm_of_emergency(std::uint16_t code) {
       return AlarmCode::limit_switch;
     case 0x8250:
       return AlarmCode::command_lost;
-    case 0x8130:
-      return AlarmCode::overtravel_module_lost;
+    case kHeartbeatLost:
+      return detail == kNcNode ? AlarmCode::heartbeat_lost : AlarmCode::overtravel_module_lost;
     case 0x2310:
       return AlarmCode::drive_fault;
-    case 0x8100:
+    case kCommunicationError:
+    case kErrorPassive:
+    case kBusOffRecovered:
+    case kPdoLengthError:
       return AlarmCode::communication_disturbed;
-    case 0x8110:
+    case kOverrunError:
       return AlarmCode::frames_lost;
     default:
       return AlarmCode::module_emergency;

@@ -3,6 +3,7 @@
 //   1xxx  probe and overtravel protection
 //   2xxx  drives
 //   3xxx  bus and modules
+//   4xxx  mains and supply
 #pragma once
 
 #include <cstdint>
@@ -30,6 +31,12 @@ enum class AlarmCode {
   bus_overloaded = 3103,
   module_gone = 3201,
   module_silent = 3202,
+  heartbeat_lost = 3203,
+  mains_lost = 4001,
+  mains_back = 4002,
+  supply_exhausted = 4003,
+  secured = 4004,
+  resumed = 4005,
 };
 
 struct AlarmText {
@@ -44,8 +51,8 @@ std::span<const AlarmText> alarm_texts();
 /// The text of one; every code has one.
 const AlarmText& alarm_text(AlarmCode code);
 
-/// The alarm that an emergency message stands for.
-AlarmCode alarm_of_emergency(std::uint16_t code);
+/// The alarm that an emergency message stands for; `detail` is its first byte of detail.
+AlarmCode alarm_of_emergency(std::uint16_t code, std::uint8_t detail = 0);
 
 /// The table as Markdown.
 std::string alarms_markdown();

@@ -16,11 +16,17 @@ using Coordinates = Eigen::Matrix<double, 5, 1>;
 /// Where the axes stand at switch-on, as axis positions.
 Coordinates start_coordinates(const Machine& machine);
 
-/// What the coordinates of a move mean.
+/// Five numbers by axis, as they are.
+AxisVector as_axes(const Coordinates& x);
+
+/// What the coordinates of a move mean. Under a tilted plane they are those of a frame F in the
+/// workpiece:  p_W = tilt_origin + Rz(tilt[0]) Rx(tilt[1]) Rz(tilt[2]) p_F.
 struct MotionFrame {
-  bool rtcp = false;         ///< false: axis positions; the rest has no meaning then
-  Vec3 p_MW = Vec3::Zero();  ///< work offset [m]
-  double tool_length = 0;    ///< [m]
+  bool rtcp = false;                ///< false: axis positions; the rest has no meaning then
+  Vec3 p_MW = Vec3::Zero();         ///< work offset [m]
+  double tool_length = 0;           ///< [m]
+  Vec3 tilt_origin = Vec3::Zero();  ///< [m]
+  Vec3 tilt = Vec3::Zero();         ///< Euler angles z, x', z'' [rad]
   friend bool operator==(const MotionFrame&, const MotionFrame&) = default;
 };
 
@@ -33,7 +39,13 @@ class FrameMap {
 
  private:
   std::optional<Kinematics> kinematics_;
+  bool tilted_ = false;
+  Vec3 origin_;
+  Mat3 R_WF_;
 };
+
+/// Rz(angles[0]) Rx(angles[1]) Rz(angles[2]).
+Mat3 tilt_rotation(const Vec3& angles);
 
 /// Circle (or spiral, within the radius tolerance) about an axis parallel to X, Y or Z.
 struct Arc {
@@ -53,7 +65,10 @@ struct Move {
   double feed = 0;       ///< tip [m/s], rotary [rad/s], time [s] for the whole move
   bool exact = false;    ///< G61
   double tolerance = 0;  ///< G64: of the controlled point [m]
-  bool alone = false;    ///< begins and ends at rest (G28, G53)
+  bool alone = false;    ///< begins and ends at rest (G28, G53, probing)
+  bool probe = false;    ///< G31, G38: would end where the probe touches
+  /// Feed as the program gives it where that is not per minute: [m] per turn of the spindle (G95).
+  double feed_per_turn = 0;
   int line = 0;
 };
 

@@ -16,6 +16,7 @@ constexpr Tick kStartUpCycles = 200;  ///< the drives must be enabled by then
 constexpr Tick kSettleCycles = 100;   ///< after the last set-point, before the run ends
 constexpr Tick kStopCycles = 5000;    ///< at most this long for a stop in an alarm
 constexpr int kSilentCyclesBearable = 2;
+constexpr Tick kRememberCycles = 20;  ///< between two records while the axes are being secured
 
 cia402::State drive_state(const DriveStatus& status) { return cia402::state_of(status.statusword); }
 
@@ -48,15 +49,28 @@ std::string module_name(int node) {
 
 }  // namespace
 
-NcUnit::NcUnit(const Machine& machine, const std::string& program, TelemetrySink& sink)
+NcUnit::NcUnit(const Machine& machine, const std::string& program, TelemetrySink& sink,
+               const NcUnitOptions& options)
     : machine_(machine),
       protection_(machine.probe),
       player_(program, machine),
       shaping_(machine_chain<InterpolationPort>(machine.effects, kNoSeed)),
-      sink_(sink) {
+      sink_(sink),
+      heartbeat_period_(heartbeat_cycles(machine.bus.heartbeat_time)),
+      outage_(machine_, player_),
+      options_(options),
+      saved_(options.record) {
+  protection_.restore(saved_.protection);
+  if (options_.resume) seek();
+  for (HeartbeatWatch& watch : heartbeats_) {
+    watch.set_time(kHeartbeatPatience * heartbeat_period_);
+    watch.heard(NmtState::operational, 0);  // as they said at the start
+  }
   for (std::size_t i = 0; i < kAxisCount; ++i) {
-    planned_.step.position[i] = machine.axes[i].limits.start;
-    measured_[i].position = measured_next_[i].position = machine.axes[i].limits.start;
+    const double start =
+        options_.resume ? options_.switched_on_at[i] : machine.axes[i].limits.start;
+    planned_.step.position[i] = start;
+    measured_[i].position = measured_next_[i].position = start;
   }
   earlier_.fill(planned_);
   for (const AxisParams& axis : machine.axes) {
@@ -66,12 +80,31 @@ NcUnit::NcUnit(const Machine& machine, const std::string& program, TelemetrySink
   }
 }
 
+/// Takes the player to where the program was held, and sees that it is the same place.
+void NcUnit::seek() {
+  constexpr double kRounding = 1e-12;
+  const auto refuse = [](const char* why) {
+    throw InputError(std::string("the interrupted program cannot go on: ") + why +
+                     "; drop it with `vcnc reset`");
+  };
+  try {
+    player_.seek(saved_.held);
+  } catch (const std::out_of_range&) {
+    refuse("it ends before the place where it was held");
+  }
+  const AxisVector rest = player_.rest();
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (std::abs(rest[i] - saved_.path_point[i]) > kRounding)
+      refuse("its path does not lead through the place where it was held");
+}
+
 bool NcUnit::step(Tick k, std::span<const Frame> answers, Frames& out) {
   latch(k, answers);
   supervise(k);
   advance(k);
   command(k, out);
   sample(k);
+  remember(k);
   if (ending_since_ < 0) return true;
   const Tick ended = k - ending_since_;
   if (alarmed_ && ended < blind_stop_cycles_ &&
@@ -108,14 +141,20 @@ void NcUnit::latch(Tick k, std::span<const Frame> answers) {
       overtravel_ = *overtravel;
     } else if (const auto emergency = decode_emergency(frame)) {
       if (emergency->code == 0 || emergency->code == kOvertravelEmergency) continue;
-      const AlarmCode code = alarm_of_emergency(emergency->code);
+      const AlarmCode code = alarm_of_emergency(emergency->code, emergency->detail[0]);
       if (emergency->node == kSpindleNode &&
-          (code == AlarmCode::command_lost || code == AlarmCode::overtravel_module_lost))
+          (code == AlarmCode::command_lost || code == AlarmCode::overtravel_module_lost ||
+           code == AlarmCode::heartbeat_lost))
         spindle_alone_ = code;
+      if (emergency->node >= 1 && emergency->node <= kSpindleNode)
+        drive_emergency_[static_cast<std::size_t>(emergency->node - 1)] = code;
       sink_.alarm(
           {k, static_cast<int>(code), module_name(emergency->node),
            fmt::format("{} (emergency message {:04X}h)", alarm_text(code).title, emergency->code)});
-    } else if (!decode_heartbeat(frame)) {
+    } else if (const auto heartbeat = decode_heartbeat(frame)) {
+      if (heartbeat->node <= kOvertravelNode)
+        heartbeats_[static_cast<std::size_t>(heartbeat->node)].heard(heartbeat->state, k);
+    } else if (!is_sdo(frame.id) && frame.id < kHeartbeatBase) {
       stray_id_ = frame.id;
     }
   }
@@ -123,9 +162,11 @@ void NcUnit::latch(Tick k, std::span<const Frame> answers) {
 
 void NcUnit::raise(Tick k, AlarmCode code, std::string source, const std::string& detail,
                    Stop stop) {
+  if (stop == Stop::hold && outage_.off_path()) stop = Stop::quick;
   std::string text = alarm_text(code).title;
   if (!detail.empty()) text += ": " + detail;
   if (planned_.step.line > 0) text += fmt::format(" (program line {})", planned_.step.line);
+  if (!alarmed_) saved_.alarm = static_cast<int>(code);
   if (!alarmed_) reason_ = fmt::format("alarm {}: {}", static_cast<int>(code), text);
   alarmed_ = true;
   state_ = NcState::alarm;
@@ -139,14 +180,28 @@ void NcUnit::raise(Tick k, AlarmCode code, std::string source, const std::string
 
 void NcUnit::supervise(Tick k) {
   watch_modules(k);
+  watch_heartbeats(k);
   watch_bus(k);
   watch_protection(k);
   if (stop_ == Stop::quick) return;
   if (state_ == NcState::starting) {
-    if (k > kStartUpCycles) raise(k, AlarmCode::drives_not_enabled, "NC unit", "", Stop::quick);
+    if (k > kStartUpCycles) refuse_start(k);
     return;
   }
   watch_drives(k);
+  watch_mains(k);
+}
+
+/// Names the drives that are not in operation.
+void NcUnit::refuse_start(Tick k) {
+  std::string names;
+  int missing = 0;
+  for (std::size_t i = 0; i <= kAxisCount; ++i) {
+    if (drive_state(measured_next_[i]) == cia402::State::operation_enabled) continue;
+    names += (names.empty() ? "" : ", ") + module_name(static_cast<int>(i) + 1);
+    ++missing;
+  }
+  raise(k, AlarmCode::drives_not_enabled, missing == 1 ? names : "NC unit", names, Stop::quick);
 }
 
 /// What the bus says has gone, and what has not been heard for too long.
@@ -167,6 +222,22 @@ void NcUnit::watch_modules(Tick k) {
     missing = true;
     raise(k, AlarmCode::module_silent, module_name(node),
           nobody ? "none is heard any more, the bus itself has failed" : module_name(node),
+          Stop::quick);
+  }
+}
+
+/// Whoever lets its heartbeat fail, or shows another state than it should be in.
+void NcUnit::watch_heartbeats(Tick k) {
+  for (int node = 1; node <= kOvertravelNode; ++node) {
+    HeartbeatWatch& watch = heartbeats_[static_cast<std::size_t>(node)];
+    const bool lost = watch.check(k) == HeartbeatWatch::Event::lost;
+    const bool left = watch.state() != NmtState::operational;
+    bool& missing = missing_[static_cast<std::size_t>(node)];
+    if (missing || (!lost && !left)) continue;
+    missing = true;
+    raise(k, AlarmCode::heartbeat_lost, module_name(node),
+          lost ? fmt::format("{}, none for {} ms", module_name(node), watch.time())
+               : fmt::format("{} says {}", module_name(node), text_of(watch.state())),
           Stop::quick);
   }
 }
@@ -192,7 +263,8 @@ void NcUnit::watch_protection(Tick k) {
                     .deflection = Vec3(probe_.deflection.data()),
                     .overtravel = (probe_.flags & ProbeSample::kOvertravel) != 0,
                     .signal_fault = (probe_.flags & ProbeSample::kSignalFault) != 0,
-                    .slip = (probe_.flags & ProbeSample::kSlip) != 0},
+                    .slip = (probe_.flags & ProbeSample::kSlip) != 0,
+                    .tick = probe_.tick},
                    false);
   const auto tell = [&](ProtectionState state, ProtectionCause cause, double deflection,
                         AlarmCode soft, AlarmCode hard, const char* source) {
@@ -217,14 +289,108 @@ void NcUnit::watch_drives(Tick k) {
     raise(k, *spindle_alone_, spindle, spindle + " has locked itself", Stop::quick);
     return;
   }
+  const bool starts = planned_.step.spindle != PlayerStep::Spindle::off;
+  if (starts && !alarmed_ && (measured_next_[kAxisCount].statusword & cia402::kLocked) != 0) {
+    raise(k, AlarmCode::spindle_locked, module_name(kSpindleNode), "", Stop::hold);
+    return;
+  }
   for (std::size_t i = 0; i <= kAxisCount; ++i) {
     if (!seen(i) || drive_state(measured_next_[i]) == cia402::State::operation_enabled) continue;
     const std::string drive =
         i < kAxisCount ? fmt::format("drive {}", kAxisNames[i]) : std::string("drive spindle");
+    const bool first = !alarmed_;
     raise(k, AlarmCode::drive_left_operation, drive,
           fmt::format("{}, statusword {:04X}h", drive, measured_next_[i].statusword), Stop::quick);
+    if (const auto& why = drive_emergency_[i]; first && why) {  // it has said why
+      reason_ =
+          fmt::format("alarm {}: {}: {}", static_cast<int>(*why), alarm_text(*why).title, drive);
+      if (planned_.step.line > 0) reason_ += fmt::format(" (program line {})", planned_.step.line);
+    }
     return;
   }
+}
+
+/// What is worth knowing and stops nothing.
+void NcUnit::tell(Tick k, AlarmCode code, const std::string& detail) {
+  std::string text = alarm_text(code).title;
+  if (!detail.empty()) text += ": " + detail;
+  if (planned_.step.line > 0) text += fmt::format(" (program line {})", planned_.step.line);
+  sink_.alarm({k, static_cast<int>(code), "NC unit", std::move(text)});
+}
+
+void NcUnit::watch_mains(Tick k) {
+  if (mains_failing_ != mains_told_) {
+    const bool playing = state_ == NcState::running || state_ == NcState::dwell;
+    tell(k, mains_failing_ ? AlarmCode::mains_lost : AlarmCode::mains_back,
+         mains_failing_ && playing ? "feed hold" : "");
+    mains_told_ = mains_failing_;
+  }
+  if (!mains_failing_ || (state_ != NcState::running && state_ != NcState::dwell)) return;
+  if (!outage_.active() || outage_.phase() == Outage::Phase::rising) outage_.begin();
+}
+
+/// One cycle of a loss of the mains, or of what follows it.
+void NcUnit::ride_out(Tick k) {
+  const bool waited = outage_.phase() == Outage::Phase::waiting;
+  const bool go_on = options_.on_power_return == OnPowerReturn::resume && !mains_failing_;
+  planned_.step = outage_.step({mains_failing_, go_on, Vec3(probe_.deflection.data())});
+  shape(k);
+  state_ = !outage_.active() || outage_.on_path() ? NcState::running : NcState::hold;
+  const bool waits = outage_.phase() == Outage::Phase::waiting;
+  if (waits && !waited) tell(k, AlarmCode::secured, options_.memory ? "state saved" : "");
+  if (waited && outage_.phase() == Outage::Phase::spindle) tell(k, AlarmCode::resumed, "");
+  if (!waits || mains_failing_ || ended_by_mains_ ||
+      options_.on_power_return == OnPowerReturn::resume)
+    return;
+  ended_by_mains_ = true;
+  ending_since_ = k;
+  reason_ = fmt::format("ended after a loss of the mains, on line {}, the probe free{}",
+                        planned_.step.line, options_.memory ? "; it can go on with --resume" : "");
+}
+
+RunStage NcUnit::stage() const {
+  if (alarmed_) return RunStage::alarm;
+  if (state_ == NcState::done) return RunStage::done;
+  switch (outage_.phase()) {
+    case Outage::Phase::none:
+      return state_ == NcState::starting ? saved_.stage : RunStage::running;
+    case Outage::Phase::holding:
+      return RunStage::holding;
+    case Outage::Phase::settling:
+      return RunStage::held;
+    case Outage::Phase::retracting:
+      return RunStage::retracting;
+    case Outage::Phase::waiting:
+    case Outage::Phase::spindle:
+      return RunStage::retracted;
+    case Outage::Phase::returning:
+    case Outage::Phase::rising:
+      break;
+  }
+  return RunStage::returning;
+}
+
+/// Writes the record where there is something new to keep.
+void NcUnit::remember(Tick k) {
+  if (options_.memory == nullptr) return;
+  const RunStage now = stage();
+  const ProtectionLatch latch = protection_.latch();
+  const bool moving = outage_.active() && outage_.phase() != Outage::Phase::waiting &&
+                      now != RunStage::alarm && state_ != NcState::starting;
+  const bool due = moving && k - saved_at_ >= kRememberCycles;
+  if (now == saved_.stage && latch == saved_.protection && !due) return;
+  saved_.stage = now;
+  saved_.protection = latch;
+  saved_.cycle = k;
+  for (std::size_t i = 0; i < kAxisCount; ++i) saved_.position[i] = measured_next_[i].position;
+  saved_.deflection = probe_heard_ ? Vec3(probe_.deflection.data()) : saved_.deflection;
+  if (resumable(now) && outage_.phase() != Outage::Phase::rising) {
+    saved_.held = player_.time();
+    saved_.path_point = player_.rest();
+  }
+  if (now == RunStage::running || now == RunStage::done) saved_.alarm = 0;
+  options_.memory->save(encode_record(saved_));
+  saved_at_ = k;
 }
 
 void NcUnit::advance(Tick k) {
@@ -235,10 +401,17 @@ void NcUnit::advance(Tick k) {
         measured_next_.begin(), measured_next_.end(),
         [](const DriveStatus& d) { return drive_state(d) == cia402::State::operation_enabled; });
     if (enabled) state_ = NcState::running;
+    if (enabled && options_.resume) {
+      outage_.go_on_from(options_.switched_on_at);
+      tell(k, AlarmCode::resumed,
+           fmt::format("{:.3f} s of the program have been played", seconds(saved_.held.cycles)));
+    }
   }
   if (state_ == NcState::done) {  // at rest, but a filter settles
     planned_.step = player_.step();
     shape(k);
+  } else if (outage_.active() && state_ != NcState::alarm) {
+    ride_out(k);
   } else if (state_ == NcState::running || state_ == NcState::dwell) {
     planned_.step = player_.step();
     shape(k);
@@ -309,6 +482,8 @@ void NcUnit::command(Tick k, Frames& out) {
   command.spindle_speed = planned_.step.spindle_speed;
   if (alarmed_) command.flags |= kSpindleLock;
   out.push_back(encode(command));
+  if (heartbeat_due(k, kNcNode, heartbeat_period_))
+    out.push_back(encode(Heartbeat{kNcNode, NmtState::operational}));
 }
 
 void NcUnit::sample(Tick k) {

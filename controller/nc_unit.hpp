@@ -15,9 +15,15 @@
 // retracts the probe (retract.hpp) with the drives in operation; a quick stop leaves braking to the
 // drives. Either way the run ends in an alarm, with the spindle locked.
 //
-// A module that the bus has lost, or of which no valid frame younger than two cycles has come,
-// means a quick stop of the others, whichever it is. The run then goes on at least as long as an
-// axis needs to brake from full speed, since a silent one cannot be seen to stand.
+// A power-fail signal while the program runs is ridden out: see controller/outage.hpp. Each step is
+// kept in the unit's memory (controller/nc_record.hpp), so that a program goes on after the supply
+// was exhausted, too. What the own protection has latched is kept there as well.
+//
+// It watches the heartbeat of every module and produces its own (node 127). A module that the bus
+// has lost, whose heartbeat fails or shows another state than operational, or of which no valid
+// frame younger than two cycles has come, means a quick stop of the others, whichever it is. The
+// run then goes on at least as long as an axis needs to brake from full speed, since a silent one
+// cannot be seen to stand.
 #pragma once
 
 #include <array>
@@ -26,10 +32,14 @@
 #include <utility>
 #include <vector>
 
+#include "bus/heartbeat.hpp"
 #include "bus/messages.hpp"
 #include "bus/node.hpp"
+#include "bus/node_memory.hpp"
 #include "bus/telemetry.hpp"
 #include "controller/alarms.hpp"
+#include "controller/nc_record.hpp"
+#include "controller/outage.hpp"
 #include "controller/player.hpp"
 #include "controller/retract.hpp"
 #include "model/effects/chain.hpp"
@@ -38,19 +48,37 @@
 
 namespace vcnc {
 
+/// What the operator wants when the mains return to a machine that has ridden out their loss.
+enum class OnPowerReturn { end, resume };
+
+struct NcUnitOptions {
+  OnPowerReturn on_power_return = OnPowerReturn::end;
+  NodeMemory* memory = nullptr;  ///< outlives the unit; null: nothing is kept
+  NcRecord record{};             ///< what was kept; program, hashes and latch go on in it
+  bool resume = false;           ///< go on where the record says, axes standing at ...
+  AxisVector switched_on_at{};   ///< ... these positions
+};
+
 class NcUnit : public Master {
  public:
   /// `machine` as the unit knows it: see as_nc_believes(). Checks the program (throws
-  /// ProgramError). `sink` outlives the unit.
-  NcUnit(const Machine& machine, const std::string& program, TelemetrySink& sink);
+  /// ProgramError, and InputError when it is not the one to resume). `sink` outlives the unit.
+  NcUnit(const Machine& machine, const std::string& program, TelemetrySink& sink,
+         const NcUnitOptions& options = {});
+  NcUnit(const NcUnit&) = delete;
+  NcUnit& operator=(const NcUnit&) = delete;
 
   bool step(Tick k, std::span<const Frame> answers, Frames& out) override;
   void cycle_load(double share) override { bus_load_ = share; }
   void node_lost(int id, const std::string& why) override { gone_.emplace_back(id, why); }
 
+  /// The supply's power-fail signal; told before step(k).
+  void power_fail(bool failing) { mains_failing_ = failing; }
+
   bool complete() const { return state_ == NcState::done; }
   const std::string& reason() const { return reason_; }  ///< why it ended, for people
-  bool alarmed() const { return alarmed_; }
+  bool alarmed() const { return alarmed_ || ended_by_mains_; }
+  RunStage stage() const;  ///< of the program, as it is kept
 
  private:
   /// Everything commanded for one instant.
@@ -63,10 +91,17 @@ class NcUnit : public Master {
 
   void latch(Tick k, std::span<const Frame> answers);
   void supervise(Tick k);
+  void refuse_start(Tick k);
   void watch_modules(Tick k);
+  void watch_heartbeats(Tick k);
   void watch_bus(Tick k);
   void watch_protection(Tick k);
   void watch_drives(Tick k);
+  void watch_mains(Tick k);
+  void ride_out(Tick k);
+  void seek();
+  void tell(Tick k, AlarmCode code, const std::string& detail);
+  void remember(Tick k);
   void advance(Tick k);
   void shape(Tick k);
   void stop_softly(Tick k);
@@ -83,10 +118,17 @@ class NcUnit : public Master {
   Player player_;
   Chain<InterpolationPort> shaping_;  ///< of the set-points
   TelemetrySink& sink_;
+  Tick heartbeat_period_;  ///< own, and of every module
 
   NcState state_ = NcState::starting;
   bool alarmed_ = false;
   Stop stop_ = Stop::none;
+  bool mains_failing_ = false, mains_told_ = false;  ///< the signal, and whether 4001 was told
+  bool ended_by_mains_ = false;
+  Outage outage_;
+  NcUnitOptions options_;
+  NcRecord saved_;  ///< what the memory holds
+  Tick saved_at_ = 0;
   std::optional<Retract> retract_;
   Tick retracting_since_ = 0;
   std::string reason_ = "interrupted";
@@ -104,9 +146,12 @@ class NcUnit : public Master {
   std::vector<std::pair<int, std::string>> gone_;         ///< told by the bus, not yet raised
   std::array<int, kOvertravelNode + 1> silent_cycles_{};  ///< by node
   std::array<bool, kOvertravelNode + 1> missing_{};       ///< by node: an alarm has been raised
+  std::array<HeartbeatWatch, kOvertravelNode + 1> heartbeats_{};  ///< by node
   std::optional<AlarmCode> spindle_alone_;  ///< it has locked itself for want of a message
-  int stray_id_ = -1;                       ///< a frame of this cycle that does not belong there
-  bool stray_told_ = false;                 ///< an alarm has been raised
+  /// What each drive has said last by an emergency message.
+  std::array<std::optional<AlarmCode>, kAxisCount + 1> drive_emergency_;
+  int stray_id_ = -1;        ///< a frame of this cycle that does not belong there
+  bool stray_told_ = false;  ///< an alarm has been raised
   int overloaded_cycles_ = 0;
   Tick blind_stop_cycles_ = 0;  ///< in which an axis stops from full speed
 };

@@ -30,7 +30,7 @@ Trajectory::Trajectory(Path path, const Machine& machine)
     : path_(std::move(path)),
       map_(machine.kinematics, path_.frame()),
       limits_(machine, rapid_share(path_, machine)),
-      nodes_(limit_nodes(path_, map_, limits_)),
+      nodes_(limit_nodes(path_, map_, limits_, probing_limit(machine))),
       law_(SpeedLaw::fastest(nodes_, limits_)) {
   std::vector<Excess> excess = verify();
   while (!excess.empty() && repairs_ < kRepairs) {
@@ -58,6 +58,7 @@ MotionSample Trajectory::at(double t) const {
     sample.q[i] = axes.q[row];
     sample.dq[i] = axes.dq[row] * law.ds;
   }
+  sample.tip = point.x.head<3>();
   sample.tip_speed = point.dx.head<3>().norm() * law.ds;
   sample.line = path_.segment(law.s).move.line;
   return sample;

@@ -13,8 +13,9 @@
 namespace vcnc {
 
 struct MotionSample {
-  AxisVector q{}, dq{};  ///< dq is the true derivative of q at this instant
-  double tip_speed = 0;  ///< of the controlled point (RTCP) or of X, Y, Z [m/s]
+  AxisVector q{}, dq{};     ///< dq is the true derivative of q at this instant
+  Vec3 tip = Vec3::Zero();  ///< the controlled point (RTCP) or X, Y, Z [m]
+  double tip_speed = 0;     ///< of the controlled point (RTCP) or of X, Y, Z [m/s]
   int line = 0;
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bus/tick.hpp"
+
 namespace vcnc {
 namespace {
 
@@ -10,6 +12,9 @@ constexpr double kCurveShare = 0.7;
 constexpr double kLargestStep = 1e-3;  ///< [m]
 constexpr double kFewestSteps = 32;
 constexpr double kStepsPerWidth = 4;
+constexpr double kReactionCycles = 5;  ///< from the deflection to braking axes, measured 3 to 4
+constexpr double kRapidShare = 0.95;   ///< of the bound: axes overshoot, feeds are up to people
+constexpr double kSlowest = 1e-5;      ///< that the probe can demand [m/s]
 
 }  // namespace
 
@@ -63,17 +68,29 @@ double LimitNode::acceleration(double v, double window, const MotionLimits& limi
   return a_scale * std::max(a, 0.0);
 }
 
+std::optional<ProbingLimit> probing_limit(const Machine& machine) {
+  if (!machine.probe.in_spindle) return std::nullopt;
+  return ProbingLimit(machine, kReactionCycles * kCycle);
+}
+
 std::vector<LimitNode> limit_nodes(const Path& path, const FrameMap& map,
-                                   const MotionLimits& limits) {
+                                   const MotionLimits& limits,
+                                   const std::optional<ProbingLimit>& probing) {
   const double length = path.length();
   std::vector<LimitNode> nodes;
   std::vector<Coordinates> slope;
   for (double s = 0;;) {
     const PathPoint point = path.eval(s);
-    slope.push_back(axis_point(map, point).dq);
+    const AxisPoint axes = axis_point(map, point);
+    slope.push_back(axes.dq);
     LimitNode& node = nodes.emplace_back();
     node.s = s;
     node.v_max = feed_limit(path, s, point.dx);
+    if (probing) {
+      const bool rapid = path.segment(s).move.kind == Move::Kind::rapid;
+      const double most = probing->at(as_axes(axes.q), as_axes(axes.dq)).factor;
+      node.v_max = std::min(node.v_max, std::max(kSlowest, (rapid ? kRapidShare : 1) * most));
+    }
     if (s >= length) break;
     const double step =
         std::min({path.half_width(s) / kStepsPerWidth, kLargestStep, length / kFewestSteps});

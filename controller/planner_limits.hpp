@@ -7,12 +7,16 @@
 // and what is left at a speed v bounds a. The speed law is a moving average over the time T of one
 // with steps in a, so that |j| <= 2 |a| / T:
 //   |a| <= (A - |q''| v^2) / |q'|,   |a| <= (J - |q'''| v^3) / (3 |q''| v + 2 |q'| / T)
+// With the probe in the spindle v is also bounded by what a crash must not exceed
+// (model/safety/probing_speed.hpp), whatever kind of motion it is.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "controller/path.hpp"
 #include "model/machine.hpp"
+#include "model/safety/probing_speed.hpp"
 
 namespace vcnc {
 
@@ -41,8 +45,12 @@ struct LimitNode {
   double acceleration(double v, double window, const MotionLimits& limits) const;
 };
 
+/// What the probe allows while it is in the spindle: of rapids, of turning axes, of blends.
+std::optional<ProbingLimit> probing_limit(const Machine& machine);
+
 /// Nodes from 0 to the length of the path, as dense as the path is sharp.
 std::vector<LimitNode> limit_nodes(const Path& path, const FrameMap& map,
-                                   const MotionLimits& limits);
+                                   const MotionLimits& limits,
+                                   const std::optional<ProbingLimit>& probing = {});
 
 }  // namespace vcnc

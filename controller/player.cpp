@@ -4,14 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <stdexcept>
 
 #include "bus/tick.hpp"
-#include "controller/gcode.hpp"
+#include "controller/gcode/interpreter.hpp"
 #include "controller/path.hpp"
 #include "controller/planner.hpp"
+#include "controller/planner_limits.hpp"
 #include "model/effects/chain.hpp"
-#include "model/safety/protection.hpp"
 
 namespace vcnc {
 namespace {
@@ -25,8 +27,7 @@ constexpr double kLongestMove = 36000;    ///< [s] at the limits of the axes
 constexpr double kExactCorner = 1.0 * kDegree;
 constexpr double kLargestChord = 2 * kPi / 3;  ///< angle of a chord
 constexpr int kMostChords = 20'000;            ///< per arc
-constexpr double kReactionCycles = 5;   ///< from the deflection to braking axes, measured 3 to 4
-constexpr double kOrientSeconds = 0.2;  ///< from a standing spindle into its M19 position
+constexpr double kOrientSeconds = 0.2;         ///< from a standing spindle into its M19 position
 
 /// About how far the controlled point goes in a move [m].
 double way_of(const Move& move) {
@@ -71,6 +72,14 @@ double nodes_of(const Move& move) {
   return way / kLargestStep + std::min(kPerWidth * way / narrowest, opening);
 }
 
+/// Into how many parts a move is cut for checks along it.
+int parts_of(const Move& move, double length) {
+  constexpr double kStep = 2e-3, kTurn = 2 * kDegree;
+  const double turn =
+      std::max((move.end - move.start).tail<2>().cwiseAbs().maxCoeff(), std::abs(move.arc.sweep));
+  return 1 + static_cast<int>(std::max(length / kStep, turn / kTurn));
+}
+
 /// Throws where a position leaves the travel of an axis.
 void check_travel(const Coordinates& q, const Machine& machine, const std::string& where) {
   constexpr double kRounding = 1e-9;
@@ -104,50 +113,85 @@ void check_move(const Move& move, const Machine& machine, const std::string& pat
     check_travel(move.end, machine, where);
     return;
   }
-  constexpr double kStep = 2e-3, kTurn = 2 * kDegree;
   const PathSegment segment = make_segment(move, 0);
-  const double turn =
-      std::max((move.end - move.start).tail<2>().cwiseAbs().maxCoeff(), std::abs(move.arc.sweep));
-  const int parts = 1 + static_cast<int>(std::max(segment.length / kStep, turn / kTurn));
+  const int parts = parts_of(move, segment.length);
   for (int i = 0; i <= parts; ++i)
     check_travel(map.to_axes(programmed_point(segment, segment.length * i / parts).x), machine,
                  where);
 }
 
-/// A probe that meets the piece at this feed must come to rest before its mechanism does.
-void check_stopping_distance(const Move& move, const Machine& machine,
-                             const std::string& path_name) {
-  if (!machine.probe.in_spindle || move.feed_mode == Move::Feed::rotary ||
-      move.kind == Move::Kind::rapid)
-    return;
-  const double way = way_of(move), time = seconds_of(move);
-  if (!(way > 0) || !(time > 0)) return;
-  double deceleration = machine.axes[kX].limits.acceleration;
-  for (const std::size_t i : {kY, kZ})
-    deceleration = std::min(deceleration, machine.axes[i].limits.acceleration);
-  const double speed = way / time;
-  const auto allowed = [&](const Vec3& way_in_probe) {
-    return largest_probing_speed(machine.probe, way_in_probe, kReactionCycles * kCycle,
-                                 deceleration);
-  };
-  double most = std::min(allowed(Vec3::UnitX()), allowed(Vec3::UnitZ()));
-  const bool tool_along_z =
-      machine.kinematics.type == KinematicsParams::Type::trunnion && !move.frame.rtcp;
-  const bool turns = move.start.tail<2>() != move.end.tail<2>();
-  if (move.kind == Move::Kind::line && !turns && (move.frame.rtcp || tool_along_z)) {
-    // One direction in the probe's frame: lateral and axial shares of the way.
-    const RotaryPair iso =
-        Kinematics(machine.kinematics, 0, Vec3::Zero()).counted({move.end[kA], move.end[kC]});
-    const Vec3 d = move.frame.rtcp ? tool_axis(iso.a, iso.c) : Vec3(Vec3::UnitZ());
-    const Vec3 direction = (move.end - move.start).head<3>().normalized();
-    const double axial = std::min(std::abs(direction.dot(d)), 1.0);
-    most = allowed({std::sqrt(1 - axial * axial), 0, axial});
+constexpr double kFeedRounding = 1e-7;  ///< relative
+
+/// Rounded down to what a person would program.
+std::string feed_word(double feed) {
+  const double digit = feed >= 10 ? 1 : 0.01;
+  return fmt::format("F{:g}", std::floor(feed * (1 + kFeedRounding) / digit) * digit);
+}
+
+/// What the feed of a move must be multiplied by for the probe, and why; the strictest on the way.
+ProbingBound probing_bound(const Move& move, const Machine& machine, const ProbingLimit& probing) {
+  const FrameMap map(machine.kinematics, move.frame);
+  const PathSegment segment = make_segment(move, 0);
+  const bool straight = move.kind != Move::Kind::arc && move.start.tail<2>() == move.end.tail<2>();
+  const int parts = straight ? 1 : parts_of(move, segment.length);
+  ProbingBound strictest{.factor = std::numeric_limits<double>::infinity()};
+  for (int i = 0; i <= parts; ++i) {
+    PathPoint point = programmed_point(segment, segment.length * i / parts);
+    double pace = 1;  // ds/dt at the feed
+    switch (move.feed_mode) {
+      case Move::Feed::none:
+        break;
+      case Move::Feed::tip:
+        pace = move.feed / point.dx.head<3>().norm();
+        point.dx.tail<2>().setZero();
+        break;
+      case Move::Feed::rotary:
+        pace = move.feed / point.dx.tail<2>().norm();
+        break;
+      case Move::Feed::time:
+        pace = segment.length / move.feed;
+        break;
+    }
+    if (!std::isfinite(pace)) continue;
+    const AxisPoint axes = axis_point(map, point);
+    const ProbingBound here = probing.at(as_axes(axes.q), as_axes(pace * axes.dq));
+    if (here.factor < strictest.factor) strictest = here;
   }
-  if (speed <= most) return;
-  throw ProgramError(fmt::format(
-      "{}:{}: F{:.0f} is too fast for the probe: in a crash it could not be stopped between its "
-      "range and its limit, or not be counted; allowed in this direction is F{:.0f}",
-      path_name, move.line, speed * 60e3, std::floor(most * 60e3)));
+  return strictest;
+}
+
+/// A probe that meets the piece at this feed must come to rest before its mechanism does. The feed
+/// of the controlled point, of rotary axes or by time is what a program asks for, so it is refused;
+/// rapids, and what axes do besides in order to turn, the planner slows down.
+void check_probing_feed(const Move& move, const Machine& machine, const ProbingLimit& probing,
+                        const std::string& path_name) {
+  const ProbingBound bound = probing_bound(move, machine, probing);
+  const char* side = bound.by == ProbingBound::By::axial ? "axial" : "lateral";
+  if (bound.factor <= 0)
+    throw ProgramError(fmt::format(
+        "{}:{}: in a crash the probe could not be stopped between its range and its {} limit at "
+        "any speed: see probe.range_mm, probe.overtravel_{}_mm, probe.overtravel_force_{}_N",
+        path_name, move.line, side, side, side));
+  if (move.feed_mode == Move::Feed::none || bound.factor >= 1 - kFeedRounding) return;
+  const double feed = move.feed_mode == Move::Feed::tip      ? move.feed * 60e3
+                      : move.feed_mode == Move::Feed::rotary ? move.feed * 60 / kDegree
+                                                             : 60 / move.feed;
+  const std::string why =
+      bound.by == ProbingBound::By::counting
+          ? "its periods could not be counted"
+          : fmt::format("in a crash it could not be stopped between its range and its {} limit",
+                        side);
+  const std::string lever = bound.lever > 0
+                                ? fmt::format(" ({} moves the ball at a lever of {:.1f} mm)",
+                                              kAxisNames[bound.axis], bound.lever * 1e3)
+                                : "";
+  throw ProgramError(fmt::format("{}:{}: {} is too fast for the probe: {}{}; allowed {} is {} {}",
+                                 path_name, move.line, feed_word(feed), why, lever,
+                                 move.feed_mode == Move::Feed::tip ? "in this direction" : "here",
+                                 feed_word(feed * bound.factor),
+                                 move.feed_mode == Move::Feed::tip      ? "mm/min"
+                                 : move.feed_mode == Move::Feed::rotary ? "deg/min"
+                                                                        : "1/min"));
 }
 
 /// Angle between the end of one move and the begin of the next, in the path's own metric.
@@ -191,6 +235,7 @@ struct Player::State {
   State(const std::string& file, const Machine& the_machine)
       : machine(the_machine), program(file, the_machine) {
     for (std::size_t i = 0; i < kAxisCount; ++i) step.position[i] = machine.axes[i].limits.start;
+    step.tip = start_coordinates(machine).head<3>();
     machine_chain<PlanPort>(machine.effects, 0).step(allowed, {});
   }
 
@@ -200,39 +245,130 @@ struct Player::State {
   std::optional<Block> pending;  ///< read, not yet played
   std::optional<Trajectory> run;
   Tick cycle = 0, cycles = 0;  ///< within the run or the dwell
+  Tick begun = 0;              ///< cycles of the program when it began
   PlayerStep step;
-  bool holding = false;
-  Tick hold_cycle = 0;    ///< since the hold
-  double hold_time = 0;   ///< T_h [s]
-  double hold_start = 0;  ///< time on the path when it began [s]
+  Tick played = 0;  ///< cycles since the program began
+  bool holding = false, rising = false;
+  Tick rate_cycle = 0;    ///< since the hold, or since the feed began to rise
+  double rate_time = 0;   ///< T_h, T_g [s]
+  double rate_start = 0;  ///< time on the path when it began [s]
+  double held_rate = 0;   ///< r
+
+  /// Time on the path of the run now [s].
+  double path_time() const {
+    if (!run) return 0;
+    const double s = std::min(seconds(rate_cycle) / rate_time, 1.0);
+    const double tau =
+        holding  ? rate_start + held_rate * rate_time * (s - s * s * s + 0.5 * s * s * s * s)
+        : rising ? rate_start + rate_time * (s * s * s - 0.5 * s * s * s * s)
+                 : seconds(cycle);
+    return std::min(tau, run->duration());
+  }
+
+  /// d tau / dt now.
+  double rate() const {
+    const double s = std::min(seconds(rate_cycle) / rate_time, 1.0);
+    const double share = s * s * (3 - 2 * s);
+    return holding ? held_rate * (1 - share) : rising ? share : 1;
+  }
+
+  /// Time in which the rate can change by `rate` so that no axis takes more than half of its
+  /// acceleration limit for it, at the velocities of the path at `tau`.
+  double time_for(double rate, double tau) const {
+    constexpr double kShortest = 10 * kCycle, kShare = 0.5, kSteepest = 1.5;
+    double time = kShortest;
+    const MotionSample now = run->at(tau);
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      time = std::max(time, kSteepest * std::abs(rate * now.dq[i]) /
+                                (kShare * machine.axes[i].limits.acceleration));
+    return time;
+  }
 
   /// Begins to brake where the run stands now.
   void begin_hold() {
-    constexpr double kShortest = 10 * kCycle, kShare = 0.5, kSteepest = 1.5;
+    const double tau = path_time();
+    held_rate = rising ? rate() : 1;
+    rate_time = run ? time_for(held_rate, tau) : kCycle;
+    rate_start = tau;
+    rate_cycle = 0;
     holding = true;
-    hold_cycle = 0;
-    hold_time = kShortest;
-    if (!run) return;
-    hold_start = std::min(seconds(cycle), run->duration());
-    const MotionSample now = run->at(hold_start);
-    for (std::size_t i = 0; i < kAxisCount; ++i)
-      hold_time = std::max(hold_time, kSteepest * std::abs(now.dq[i]) /
-                                          (kShare * machine.axes[i].limits.acceleration));
+    rising = false;
   }
 
-  bool held() const { return holding && (!run || seconds(hold_cycle) >= hold_time); }
+  bool held() const { return holding && (!run || seconds(rate_cycle) >= rate_time); }
 
-  /// One cycle of braking along the path.
-  void brake() {
-    ++hold_cycle;
-    const double s = std::min(seconds(hold_cycle) / hold_time, 1.0);
-    const double rate = 1 - s * s * (3 - 2 * s);
-    const double passed = hold_time * (s - s * s * s + 0.5 * s * s * s * s);
-    const MotionSample sample = run->at(std::min(hold_start + passed, run->duration()));
+  /// Time on the path at which a hold comes to rest [s].
+  double rest_time() const {
+    return run ? std::min(rate_start + 0.5 * held_rate * rate_time, run->duration()) : 0;
+  }
+
+  /// Whole cycles of the run or dwell that have passed at a time on its path.
+  Tick whole_cycles(double tau) const {
+    return run ? std::min(static_cast<Tick>(std::floor(tau / kCycle)), cycles) : cycle;
+  }
+
+  void begin_rise() {
+    if (!run) {  // a dwell simply goes on
+      holding = false;
+      return;
+    }
+    const double tau = path_time();
+    double time = time_for(1, tau);
+    constexpr int kLooks = 8;
+    for (int i = 1; i <= kLooks; ++i) time = std::max(time, time_for(1, tau + time * i / kLooks));
+    // T_g / 2 = (n + fraction) cycles, so that tau is whole at its end.
+    const Tick whole = whole_cycles(tau);
+    const double fraction = tau / kCycle - static_cast<double>(whole);
+    const double n = std::ceil(0.5 * time / kCycle);
+    rate_time = 2 * (n + fraction) * kCycle;
+    cycle = whole - static_cast<Tick>(n);  // what is added until then: n + fraction of T_g
+    rate_start = tau;
+    rate_cycle = 0;
+    holding = false;
+    rising = true;
+  }
+
+  /// One cycle along the path at the rate that holds then.
+  void move_on_path() {
+    const MotionSample sample = run->at(path_time());
+    const double share = rate();
     step.position = sample.q;
+    step.tip = sample.tip;
     step.line = sample.line;
-    step.feed = sample.tip_speed * rate;
-    for (std::size_t i = 0; i < kAxisCount; ++i) step.velocity[i] = sample.dq[i] * rate;
+    step.feed = sample.tip_speed * share;
+    for (std::size_t i = 0; i < kAxisCount; ++i) step.velocity[i] = sample.dq[i] * share;
+  }
+
+  void brake() {
+    ++rate_cycle;
+    move_on_path();
+  }
+
+  void rise() {
+    ++rate_cycle;
+    if (seconds(rate_cycle) < rate_time) {
+      move_on_path();
+      return;
+    }
+    cycle += rate_cycle;  // whole again
+    rising = false;
+    played = begun + cycle;
+    play();
+  }
+
+  /// The run at whole cycles, as programmed.
+  void play() {
+    const MotionSample sample = run->at(std::min(seconds(cycle), run->duration()));
+    step.position = sample.q;
+    step.velocity = sample.dq;
+    step.tip = sample.tip;
+    step.feed = sample.tip_speed;
+    step.line = sample.line;
+    if (cycle >= cycles) {
+      cycle = cycles;
+      played = begun + cycle;
+      run.reset();
+    }
   }
 
   Block take() {
@@ -281,6 +417,7 @@ struct Player::State {
   }
 
   void begin_wait(double seconds) {
+    begun = played;
     cycle = 0;
     cycles = static_cast<Tick>(std::ceil(seconds / kCycle - 1e-9));
   }
@@ -338,10 +475,11 @@ struct Player::State {
 
 Player::Player(const std::string& path, const Machine& machine) {
   GcodeInterpreter check(path, machine);
+  const std::optional<ProbingLimit> probing = probing_limit(machine);
   for (Block block = check.next(); !std::holds_alternative<ProgramEnd>(block); block = check.next())
     if (const Move* move = std::get_if<Move>(&block)) {
       check_move(*move, machine, path);
-      check_stopping_distance(*move, machine, path);
+      if (probing) check_probing_feed(*move, machine, *probing, path);
     }
   state_ = std::make_unique<State>(path, machine);
 }
@@ -354,32 +492,58 @@ void Player::hold() {
 
 bool Player::held() const { return state_->held(); }
 
+void Player::go_on() {
+  if (state_->held()) state_->begin_rise();
+}
+
+bool Player::at_full_rate() const { return !state_->holding && !state_->rising; }
+
+ProgramTime Player::time() const {
+  const State& state = *state_;
+  const double tau = state.holding ? state.rest_time() : state.path_time();
+  return {state.begun + state.whole_cycles(tau), state.run ? tau : 0};
+}
+
+AxisVector Player::rest() const {
+  const State& state = *state_;
+  if (!state.run) return state.step.position;
+  return state.run->at(state.holding ? state.rest_time() : state.path_time()).q;
+}
+
+void Player::seek(const ProgramTime& time) {
+  State& state = *state_;
+  while (state.played < time.cycles && !state.step.done) step();
+  if (state.played != time.cycles) throw std::out_of_range("the program ends before that moment");
+  state.holding = true;
+  state.rate_start = time.on_path;
+  state.held_rate = 0;
+  state.rate_time = seconds(1);
+  state.rate_cycle = 1;
+  if (state.run) state.move_on_path();
+}
+
 PlayerStep Player::step() {
   State& state = *state_;
-  if (state.holding) {
-    state.step.velocity = {};
-    state.step.feed = 0;
-    if (state.run) state.brake();
-    return state.step;
-  }
-  if (state.cycle >= state.cycles) state.begin_next();
   PlayerStep& step = state.step;
   step.velocity = {};
   step.feed = 0;
+  if (state.holding) {
+    if (state.run) state.brake();
+    return step;
+  }
+  if (state.rising) {
+    state.rise();
+    return step;
+  }
+  if (state.cycle >= state.cycles) state.begin_next();
   step.dwell = false;
   if (step.done) return step;
   ++state.cycle;
-  if (!state.run) {
+  ++state.played;
+  if (state.run)
+    state.play();
+  else
     step.dwell = true;
-    return step;
-  }
-  const double t = std::min(seconds(state.cycle), state.run->duration());
-  const MotionSample sample = state.run->at(t);
-  step.position = sample.q;
-  step.velocity = sample.dq;
-  step.feed = sample.tip_speed;
-  step.line = sample.line;
-  if (state.cycle == state.cycles) state.run.reset();
   return step;
 }
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "controller/planner_limits.hpp"
 #include "model/geometry/kinematics.hpp"
 
 namespace vcnc {
@@ -221,6 +222,16 @@ Circle choose_circle(const Machine& machine, const Piece* piece, const ProgramOp
   return {centre, o.radius_mm ? *o.radius_mm * 1e-3 : radius, true};
 }
 
+/// The feed asked for, or what the probe allows of it where the axis starts.
+double step_feed(const Machine& machine, const ProgramOptions& o, double scale) {
+  const std::optional<ProbingLimit> probing = probing_limit(machine);
+  if (!probing) return o.feed_mm_min;
+  AxisVector speeds{};
+  speeds[o.axis] = o.feed_mm_min * scale / 60;
+  const double factor = probing->at(as_axes(start_coordinates(machine)), speeds).factor;
+  return factor < 1 ? std::floor(o.feed_mm_min * factor) : o.feed_mm_min;
+}
+
 }  // namespace
 
 std::string s_piece_program(const Machine& machine, const Piece& piece,
@@ -293,7 +304,8 @@ std::string circle_program(const Machine& machine, const Piece* piece, const Pro
   return text + go_home();
 }
 
-std::string step_program(const Machine& machine, const ProgramOptions& o) {
+std::string step_program(const Machine& machine, const ProgramOptions& options) {
+  ProgramOptions o = options;
   check_options(o);
   if (o.axis >= kAxisCount) fail("axis must be one of X Y Z A C");
   if (o.step_size == 0 || !std::isfinite(o.step_size)) fail("step_size must not be 0");
@@ -306,6 +318,8 @@ std::string step_program(const Machine& machine, const ProgramOptions& o) {
     fail(fmt::format("steps x step_size leads {} to {:.3f}; allowed is {:.3f} to {:.3f}",
                      kAxisNames[o.axis], last / scale, limits.min / scale, limits.max / scale));
 
+  o.feed_mm_min = step_feed(machine, o, scale);
+  check_positive(o.feed_mm_min, "what the probe allows as feed_mm_min");
   std::string text =
       header(fmt::format("Steps of {} along {}", o.step_size, kAxisNames[o.axis]), machine, o);
   text += fmt::format("({} forward and back, {} time{}, {:g} s dwell at each.)\n", o.steps, o.laps,

@@ -55,6 +55,7 @@ std::string cone_program(const Machine& machine, const Piece& piece, const Progr
 /// `piece` may be null: then a free circle about the machine's start position; radius_mm is needed.
 std::string circle_program(const Machine& machine, const Piece* piece,
                            const ProgramOptions& options);
+/// With the probe in the spindle at most at the feed it allows.
 std::string step_program(const Machine& machine, const ProgramOptions& options);
 
 }  // namespace vcnc

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "bus/fault.hpp"
+#include "bus/heartbeat.hpp"
+#include "bus/object_dictionary.hpp"
 
 namespace vcnc {
 
@@ -48,6 +50,7 @@ ProbeNode::ProbeNode(const Machine& machine, std::unique_ptr<Piece> piece, std::
 ProbeNode::ProbeNode(const Machine& machine, std::unique_ptr<Piece> piece, std::uint64_t seed,
                      TruthPort& truth, const ProbeParams& declared)
     : probe_(machine.probe),
+      profile_{kNoProfile, kProbeProduct, heartbeat_cycles(machine.bus.heartbeat_time)},
       range_(usable_range(declared)),
       kinematics_(machine.kinematics, machine.probe.length, machine.setup.work_offset[0]),
       piece_(std::move(piece)),
@@ -65,11 +68,36 @@ ProbeNode::ProbeNode(const Machine& machine, std::unique_ptr<Piece> piece, std::
   felt_.fill(Vec3::Zero());
 }
 
+// clang-format off
+void ProbeNode::declare(ObjectDictionary& objects) {
+  using enum ObjectAccess;
+  using enum ObjectType;
+  const auto fixed = [](double value, double per_unit) {
+    return [n = counts(value, per_unit)] { return n; };
+  };
+  objects.add({0x2100, 0, "Flags of the last sample", u16, read_only,
+               "bit 0 contact, 1 out of range, 2 slip, 3 signal fault, 4 overtravel",
+               [this] { return told_.flags; }});
+  objects.array(0x2101, "Deflection");
+  for (std::size_t i = 0; i < 3; ++i)
+    objects.add({0x2101, static_cast<std::uint8_t>(i + 1), std::string(1, "xyz"[i]), i32, read_only,
+                 "0.1 um", [this, i] { return counts(told_.deflection[i], 1e7); }});
+  objects.add({0x2102, 0, "Smallest deflection that is contact", u32, constant, "0.1 um",
+               fixed(probe_.min_deflection, 1e7)});
+  objects.add({0x2103, 0, "Measuring range each side", u32, constant, "0.1 um", fixed(probe_.range, 1e7)});
+  objects.add({0x2104, 0, "Signal period", u32, constant, "nm", fixed(probe_.signal_period, 1e9)});
+  objects.add({0x2105, 0, "Converter resolution", u8, constant, "bit", fixed(probe_.adc_bits, 1)});
+  objects.add({0x2106, 0, "Spring rate", u32, constant, "N/m", fixed(probe_.spring_rate, 1)});
+}
+// clang-format on
+
 void ProbeNode::suffer(const BusFault& fault) {
   ChannelFault& channel = broken_[static_cast<std::size_t>(fault.channel)];
   if (fault.kind == BusFault::Kind::wire_break) channel = ChannelFault::wire_break;
   if (fault.kind == BusFault::Kind::stuck_adc) channel = ChannelFault::stuck;
   if (fault.kind == BusFault::Kind::saturated) channel = ChannelFault::saturated;
+  if (fault.kind == BusFault::Kind::slip)
+    miscounted_[static_cast<std::size_t>(fault.channel)] += fault.count;
 }
 
 /// Positions, velocities and accelerations of the axes from the last samples.
@@ -131,8 +159,12 @@ ProbeSample ProbeNode::reading(Tick k) const {
 }
 
 void ProbeNode::step(Tick k, std::span<const Frame> inputs, Frames& out) {
-  for (std::size_t c = 0; c < channels_.size(); ++c) channels_[c].suffer(broken_[c]);
+  for (std::size_t c = 0; c < channels_.size(); ++c) {
+    channels_[c].suffer(broken_[c]);
+    channels_[c].miscount(miscounted_[c]);
+  }
   broken_.fill(ChannelFault::none);
+  miscounted_.fill(0);
   if (k == 0) {
     sample(start_);
   } else {
@@ -143,7 +175,8 @@ void ProbeNode::step(Tick k, std::span<const Frame> inputs, Frames& out) {
       sample(last_known_);
     }
   }
-  out.push_back(encode(reading(k)));
+  told_ = reading(k);
+  out.push_back(encode(told_));
 }
 
 void ProbeNode::hold_missing(Tick k, std::span<const Frame> inputs,

@@ -36,12 +36,16 @@ class ProbeNode : public Node {
   }
   /// Throws TruthError when the simulators' own channel failed.
   void step(Tick k, std::span<const Frame> inputs, Frames& out) override;
-  /// wire_break, stuck_adc, saturated
+  DeviceProfile profile() const override { return profile_; }
+  void declare(ObjectDictionary& objects) override;
+  /// wire_break, stuck_adc, saturated, slip
   void suffer(const BusFault& fault) override;
 
   /// For observers of a simulation, never for a part of the machine: the true deflections (probe
   /// frame) of the last cycle; number j belongs to t_k - (9 - j) 100 us.
   const std::array<Vec3, kLoopStepsPerCycle>& true_deflections() const { return felt_; }
+  /// The same of the axes: where they truly are at t_k.
+  const AxisVector& true_axes() const { return last_known_; }
 
  private:
   ProbeNode(const Machine& actual, std::unique_ptr<Piece> piece, std::uint64_t seed,
@@ -54,6 +58,7 @@ class ProbeNode : public Node {
                     std::array<TruthCycle, kTruthAxes>& truth) const;
 
   ProbeParams probe_;
+  DeviceProfile profile_;
   UsableRange range_;
   Kinematics kinematics_;
   std::unique_ptr<Piece> piece_;
@@ -65,11 +70,13 @@ class ProbeNode : public Node {
   std::array<ChannelSample, 3> last_;
   std::array<Vec3, kLoopStepsPerCycle> felt_;
   bool overtravelled_ = false;
+  ProbeSample told_;  ///< last reading
   std::int64_t samples_ = 0;
   PosePort::Context<double> motion_;  ///< of all axes, where an effect needs it
   TruthPort& truth_;
   AxisVector start_, last_known_;
   std::array<ChannelFault, 3> broken_{};  ///< in this cycle
+  std::array<int, 3> miscounted_{};       ///< periods, in this cycle
 };
 
 }  // namespace vcnc

@@ -1,6 +1,7 @@
 #include "model/probe/signals.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -10,6 +11,8 @@ namespace {
 constexpr double kSampleTime = 100e-6;  // [s]
 constexpr double kNominalAmplitude = 0.5;
 constexpr double kLeastShare = 0.6, kMostShare = 1.4;  // of the amplitude
+constexpr std::array kTestSignals{-0.25, 0.25};        // [V] before the front end
+constexpr double kTestTolerance = 1.0 / 64;            // of all codes
 constexpr double kLargestStep = 0.8 * kPi, kLargestChange = 0.5 * kPi;
 
 double wrap(double angle) { return angle - 2 * kPi * std::round(angle / (2 * kPi)); }
@@ -50,6 +53,16 @@ SignalChannel::SignalChannel(const ProbeParams& probe, int component, Chain<Anal
       effects_(std::move(effects)),
       component_(component) {}
 
+/// The self-test of both converters. One that is not frozen passes: it converts what it is given.
+bool SignalChannel::converts(bool frozen) const {
+  const double tolerance = kTestTolerance * (1u << adc_.bits);
+  return !frozen || std::all_of(kTestSignals.begin(), kTestSignals.end(), [&](double signal) {
+    const int expected = adc_.code(signal);
+    return std::abs(last_cos_ - expected) <= tolerance &&
+           std::abs(last_sin_ - expected) <= tolerance;
+  });
+}
+
 ChannelSample SignalChannel::sample(double true_deflection) {
   SinCos analogue =
       Lissajous{.amplitude = kNominalAmplitude}.signals(2 * kPi / period_ * true_deflection);
@@ -78,9 +91,10 @@ ChannelSample SignalChannel::sample(double true_deflection) {
   }
   const double share = std::sqrt(digital.u * digital.u + digital.w * digital.w) / amplitude;
   result.fault = share < kLeastShare || share > kMostShare || adc_.clipped(result.cos_code) ||
-                 adc_.clipped(result.sin_code);
+                 adc_.clipped(result.sin_code) || !converts(stuck);
   check_slip_ = check_slip_ || share < kLeastShare || share > kMostShare;
-  result.deflection = unwrapper_.step(std::atan2(digital.w, digital.u)) * period_ / (2 * kPi);
+  result.deflection = unwrapper_.step(std::atan2(digital.w, digital.u)) * period_ / (2 * kPi) +
+                      miscounted_ * period_;
   result.slip = check_slip_ || unwrapper_.slipped();
   return result;
 }

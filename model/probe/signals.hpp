@@ -12,6 +12,11 @@
 // the design limit. A slip is flagged and stays flagged, never repaired: |d| > 0.8 pi, a step that
 // differs from the last one by more than pi / 2, a signal amplitude outside 0.6 .. 1.4 of R1, or a
 // free probe that does not read zero (check_zero).
+// After every sample both converters convert two known voltages of the module's own, 0.5 V apart; a
+// code further than 1/64 of the range from what it must be is a fault. So a frozen converter is
+// found in the sample in which it freezes, whether the probe moves or not: its one code cannot be
+// both. Source: usual self-test of acquisition modules (test of analogue inputs, IEC 60730-1 annex
+// H).
 // Resolution: one code is 1 / 1551 rad or 2.05 nm of 20 um with 12 bits, 0.13 nm with 16 bits.
 // Not modelled: anti-alias filter, integral non-linearity, noise, jitter and
 // crosstalk come from effects (AnaloguePort, DeflectionPort).
@@ -57,7 +62,7 @@ struct ChannelSample {
   std::uint16_t cos_code = 0, sin_code = 0;
   double deflection = 0;  ///< what the module makes of them [m]
   bool slip = false;      ///< periods were lost at some time since the last zero
-  bool fault = false;     ///< amplitude out of bounds or converter at its end, now
+  bool fault = false;     ///< amplitude, converter at its end or self-test failed, now
 };
 
 /// What is broken in a channel: both signals at mid voltage, a converter that repeats its last
@@ -73,6 +78,8 @@ class SignalChannel {
   ChannelSample sample(double true_deflection);
 
   void suffer(ChannelFault fault) { fault_ = fault; }  ///< from now on
+  /// Whole periods that are counted wrong from now on.
+  void miscount(int periods) { miscounted_ = periods; }
 
   /// For a probe known to be free: whole periods that the reading is off (0: none); flags a slip
   /// otherwise.
@@ -84,6 +91,8 @@ class SignalChannel {
   }
 
  private:
+  bool converts(bool frozen) const;
+
   double period_;
   Adc adc_;
   ProbeParams::Correction correction_;
@@ -91,6 +100,7 @@ class SignalChannel {
   int component_;
   std::int64_t samples_ = 0;
   ChannelFault fault_ = ChannelFault::none;
+  int miscounted_ = 0;                         ///< periods
   std::uint16_t last_cos_ = 0, last_sin_ = 0;  ///< codes
   OnlineCorrector corrector_;
   Unwrapper unwrapper_;

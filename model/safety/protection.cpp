@@ -5,7 +5,25 @@
 
 namespace vcnc {
 
+namespace {
+
+constexpr int kSamplesPerCycle = 10;  ///< of the probe module
+
+}  // namespace
+
 Protection::Protection(const ProbeParams& probe) : probe_(probe), range_(usable_range(probe)) {}
+
+void Protection::restore(const ProtectionLatch& latch) {
+  if (latch.state < ProtectionState::soft_stop) return;
+  state_ = latch.state;
+  cause_ = latch.cause;
+  deflection_ = latch.deflection;
+}
+
+ProtectionLatch Protection::latch() const {
+  if (!latched()) return {};
+  return {state_, cause_, deflection_};
+}
 
 Protection::Verdict Protection::judge(const ProtectionEvidence& seen) const {
   using enum ProtectionState;
@@ -17,7 +35,7 @@ Protection::Verdict Protection::judge(const ProtectionEvidence& seen) const {
   }
   if (seen.overtravel) return {hard, Cause::overtravel};
   if (seen.signal_fault || !seen.deflection.allFinite()) return {hard, Cause::signal};
-  if (seen.slip) return {hard, Cause::slip};
+  if (seen.slip || jumps(seen)) return {hard, Cause::slip};
   const double lateral = seen.deflection.head<2>().norm(), axial = std::abs(seen.deflection.z());
   const double k = probe_.spring_rate;
   if (lateral >= probe_.overtravel_lateral || axial >= probe_.overtravel_axial ||
@@ -29,6 +47,16 @@ Protection::Verdict Protection::judge(const ProtectionEvidence& seen) const {
   return {share > kWarnShare ? warn : normal, Cause::none};
 }
 
+/// Whether the reading went further since the last sample than periods can be counted. A tick far
+/// from the last one is spoiled and excuses nothing.
+bool Protection::jumps(const ProtectionEvidence& seen) const {
+  if (!seen.tick || !last_.tick) return false;
+  const int cycles =
+      std::clamp<int>(static_cast<std::uint16_t>(*seen.tick - *last_.tick), 1, kSilentCycles + 1);
+  const double largest = probe_.signal_period / 2 * kSamplesPerCycle * cycles;
+  return (seen.deflection - last_.deflection).cwiseAbs().maxCoeff() > largest;
+}
+
 void Protection::step(const ProtectionEvidence& seen, bool reset) {
   if (seen.sampled) {
     heard_ = true;
@@ -37,6 +65,7 @@ void Protection::step(const ProtectionEvidence& seen, bool reset) {
     ++silent_;
   }
   const Verdict now = judge(seen);
+  if (seen.sampled) last_ = seen;
   const bool cause_gone =
       now.state < ProtectionState::soft_stop && (seen.sampled || !probe_.in_spindle);
   if (latched() && !(reset && cause_gone)) {
@@ -58,7 +87,7 @@ const char* text_of(ProtectionCause cause) {
     case ProtectionCause::silent:
       return "the probe has fallen silent";
     case ProtectionCause::slip:
-      return "the probe moved too fast to be counted, its reading is lost";
+      return "the probe moved or jumped too far to be counted, its reading is lost";
     case ProtectionCause::limit:
       return "deflection or force at the probe's mechanical limit";
     case ProtectionCause::runaway:
@@ -67,31 +96,6 @@ const char* text_of(ProtectionCause cause) {
       break;
   }
   return "no cause";
-}
-
-double stopping_distance(double speed, double reaction_time, double deceleration) {
-  return speed * reaction_time + speed * speed / (2 * deceleration);
-}
-
-double largest_probing_speed(const ProbeParams& probe, const Vec3& way, double reaction_time,
-                             double deceleration) {
-  const UsableRange range = usable_range(probe);
-  const double k = probe.spring_rate;
-  const double lateral_end = std::min(probe.overtravel_lateral, probe.overtravel_force_lateral / k);
-  const double axial_end = std::min(probe.overtravel_axial, probe.overtravel_force_axial / k);
-  const double x = std::max(range.positive.x(), range.negative.x());
-  const double y = std::max(range.positive.y(), range.negative.y());
-  const double z = std::max(range.positive.z(), range.negative.z());
-  const double lateral_start = Protection::kRunawayShare * std::hypot(x, y);
-  const double axial_start = Protection::kRunawayShare * z;
-  const double lateral = way.head<2>().norm(), axial = std::abs(way.z());
-  const double reserve = std::min(2 * (lateral_end - lateral_start) / (1 + lateral),
-                                  2 * (axial_end - axial_start) / (1 + axial));
-  // v t + v^2 / 2a = reserve
-  const double at = deceleration * reaction_time;
-  const double stopping = -at + std::sqrt(at * at + 2 * deceleration * std::max(reserve, 0.0));
-  constexpr double kSampleTime = 100e-6;
-  return std::min(stopping, probe.signal_period / (2 * kSampleTime));
 }
 
 }  // namespace vcnc

@@ -11,8 +11,10 @@
 //                runaway   125 % of the usable range: the soft stop was not obeyed or came too late
 //                signal    faulty sine or cosine (broken wire, saturated converter), or a reading
 //                          that is not a number
-//                slip      the ball moved too fast to be counted: the reading means nothing any
-//                more silent    no sample for more than two cycles
+//                slip      the ball moved too fast to be counted, or the reading jumped further
+//                          than can be counted in the time between two samples (half a signal
+//                          period per 100 us): it means nothing any more
+//                silent    no sample for more than two cycles
 //
 // It only ever goes up by itself. SOFT_STOP and HARD are latched: the operator's reset opens them,
 // and only when their cause is gone. NORMAL and WARN follow the deflection. A silent probe counts
@@ -24,6 +26,9 @@
 // and forces of the machine file. Source: overtravel values of SP2-1 class probes (x, y 18 mm with
 // a 100 mm stylus and 20..65 N; z 5 mm and 400..600 N); the two stages are our own.
 #pragma once
+
+#include <cstdint>
+#include <optional>
 
 #include "model/probe/contact.hpp"
 
@@ -41,11 +46,21 @@ enum class ProtectionCause {
   runaway
 };
 
+/// What is latched, to be kept while the machine is off.
+struct ProtectionLatch {
+  ProtectionState state = ProtectionState::normal;
+  ProtectionCause cause = ProtectionCause::none;
+  double deflection = 0;  ///< magnitude when it was latched [m]
+  bool operator==(const ProtectionLatch&) const = default;
+};
+
 /// What one path sees in one cycle.
 struct ProtectionEvidence {
   bool sampled = false;  ///< a sample has come; else the rest has no meaning
   Vec3 deflection = Vec3::Zero();
   bool overtravel = false, signal_fault = false, slip = false;
+  /// Low 16 bits of the tick of the sample; nothing: jumps are not looked for.
+  std::optional<std::uint16_t> tick{};
 };
 
 class Protection {
@@ -55,6 +70,9 @@ class Protection {
 
   explicit Protection(const ProbeParams& probe);
 
+  /// Begins with what was latched before the machine was switched off.
+  void restore(const ProtectionLatch& latch);
+
   /// One cycle; `reset` is the operator's.
   void step(const ProtectionEvidence& seen, bool reset);
 
@@ -63,6 +81,8 @@ class Protection {
   /// Magnitude when it was latched, else now [m].
   double deflection() const { return deflection_; }
   bool latched() const { return state_ >= ProtectionState::soft_stop; }
+  /// Nothing but the defaults unless latched().
+  ProtectionLatch latch() const;
 
  private:
   struct Verdict {
@@ -70,34 +90,19 @@ class Protection {
     ProtectionCause cause = ProtectionCause::none;
   };
   Verdict judge(const ProtectionEvidence& seen) const;
+  bool jumps(const ProtectionEvidence& seen) const;
 
   ProbeParams probe_;
   UsableRange range_;
   ProtectionState state_ = ProtectionState::normal;
   ProtectionCause cause_ = ProtectionCause::none;
   double deflection_ = 0;
+  ProtectionEvidence last_;  ///< sample
   bool heard_ = false;
   int silent_ = 0;
 };
 
 /// One sentence for people.
 const char* text_of(ProtectionCause cause);
-
-/// How far the machine goes on after the probe has left its range [m]: reaction time and braking,
-///   s = v t_r + v^2 / 2a
-double stopping_distance(double speed, double reaction_time, double deceleration);
-
-/// The largest speed of the controlled point in the direction `way` (unit vector, probe frame) at
-/// which a crash cannot take the probe to its mechanical limit. With the reserve r between the hard
-/// stage (runaway: a soft stop may come too late) and the limit, of each component,
-///   v t_r + v^2 / 2a <= r / ((1 + share) / 2)
-/// where share is that of the way in the component: the deflection goes along the surface normal n,
-/// (w n) n, whose component along e is at most (1 + |w e|) / 2 of the way. The lateral hard stage
-/// is at the corner of the range. Besides, periods must be countable, or nobody would see the range
-/// being left: v <= signal period / (2 x 100 us) (model/probe/signals.hpp).
-/// Not covered: motions in which the axes move faster than the controlled point (RTCP with turning
-/// axes), whose quick stop leaves the path.
-double largest_probing_speed(const ProbeParams& probe, const Vec3& way, double reaction_time,
-                             double deceleration);
 
 }  // namespace vcnc

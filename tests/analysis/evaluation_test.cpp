@@ -76,6 +76,20 @@ TEST(Evaluation, ToleranceOnARunOfSamplesFails) {
   EXPECT_NEAR(s.groups.front().e_n.at_max, 0.2, 1.1e-3);
 }
 
+TEST(Evaluation, TheVerdictNamesTheWorstPlaceNotTheFirst) {
+  SyntheticRun run(synthetic::machine(), synthetic::piece_params("s_eq1"));
+  run.lap(20e-3, 0.1e-3, [](const Station& st) {
+    const double e = st.s > 0.1 && st.s < 0.102   ? 60e-6
+                     : st.s > 0.2 && st.s < 0.202 ? (st.s > 0.201 ? -95e-6 : -80e-6)
+                                                  : 0;
+    return Vec3(e * st.n);
+  });
+  const Summary s = evaluate(run);
+  EXPECT_EQ(s.verdict, Verdict::fail);
+  EXPECT_NE(s.verdict_reason.find("e_n = -95.0 um at s = 20"), std::string::npos)
+      << s.verdict_reason;
+}
+
 TEST(Evaluation, SingleSamplesOverToleranceNeitherPassNorFail) {
   SyntheticRun run(synthetic::machine(), synthetic::piece_params("s_eq1"));
   run.lap(20e-3, 0.1e-3, [](const Station& st) {

@@ -2,13 +2,17 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <bit>
 #include <cstring>
 #include <fstream>
+#include <memory>
+#include <random>
 #include <sstream>
 
 #include "scratch.hpp"
@@ -107,6 +111,86 @@ TEST(Recording, KilledWriterLeavesAReadableFile) {
   EXPECT_EQ(reader.missing()[0], "end of the run");
   EXPECT_FALSE(reader.end().complete);
   EXPECT_EQ(reader.end().reason, "interrupted");
+}
+
+/// Writes until it is killed, which is when it has begun row `last` or soon after: the block it is
+/// in may be anywhere on its way to the file. Every 700th row brings an alarm.
+int rows_begun_by_a_writer_killed_at(const Scratch& dir, int last) {
+  void* shared =
+      ::mmap(nullptr, sizeof(int), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  auto* row = static_cast<std::atomic<int>*>(shared);
+  const pid_t child = fork();
+  if (child == 0) {
+    RecordingWriter writer(dir / "recording.h5", kBegin);
+    for (int k = 0;; ++k) {
+      row->store(k, std::memory_order_release);
+      if (k % 700 == 699) writer.alarm({k, 1003, "probe", "out of range"});
+      writer.row(numbered(k));
+    }
+  }
+  while (row->load(std::memory_order_acquire) < last) {
+  }
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  const int begun = row->load();
+  ::munmap(shared, sizeof(int));
+  return begun;
+}
+
+// At 200 seeded places, in the midst of whatever the writer does there: the recording opens, its
+// rows are a beginning of what was written and lack at most the block being written, and what is
+// missing is said, also in the summary.
+TEST(Recording, AWriterKilledAnywhereLeavesAReadableFile) {
+  std::mt19937 random(200);
+  for (int i = 0; i < 200; ++i) {
+    const Scratch dir;
+    const int last = 1 + static_cast<int>(random() % 3000);
+    const int begun = rows_begun_by_a_writer_killed_at(dir, last);
+    SCOPED_TRACE("killed in row " + std::to_string(begun));
+    const std::unique_ptr<RecordingReader> reader = [&]() -> std::unique_ptr<RecordingReader> {
+      try {
+        return std::make_unique<RecordingReader>(dir.path());
+      } catch (const RecordingError& e) {
+        ADD_FAILURE() << e.what();
+        return nullptr;
+      }
+    }();
+    if (!reader) continue;
+    EXPECT_LE(reader->rows(), static_cast<std::uint64_t>(begun) + 1);
+    EXPECT_GE(reader->rows() + 1000, static_cast<std::uint64_t>(begun));
+    int k = 0;
+    reader->for_each([&](const TelemetryRow& row) { ASSERT_TRUE(same_bits(row, numbered(k++))); });
+    EXPECT_EQ(reader->missing(), std::vector<std::string>{"end of the run"});
+    for (const Alarm& alarm : reader->alarms()) EXPECT_LE(alarm.tick, begun);
+  }
+}
+
+// A file whose tail the disk never got: it opens and says what is missing, or is refused in one
+// sentence that names it.
+TEST(Recording, AFileCutOffAnywhereOpensOrSaysWhy) {
+  const Scratch dir;
+  {
+    RecordingWriter writer(dir / "recording.h5", kBegin);
+    for (int k = 0; k < 2345; ++k) writer.row(numbered(k));
+    writer.finish(complete_end());
+  }
+  std::ifstream in(dir / "recording.h5", std::ios::binary);
+  const std::string whole(std::istreambuf_iterator<char>(in), {});
+  std::mt19937 random(7);
+  int opened = 0;
+  for (int i = 0; i < 200; ++i) {
+    const std::string path = dir / "cut.h5";
+    const std::size_t size = i == 0 ? whole.size() - 32 : random() % whole.size();
+    std::ofstream(path, std::ios::binary) << whole.substr(0, size);
+    try {
+      const RecordingReader reader(path);
+      ++opened;
+      EXPECT_FALSE(reader.missing().empty()) << "at least the seal";
+    } catch (const RecordingError& e) {
+      EXPECT_NE(std::string(e.what()).find("cut.h5: "), std::string::npos) << e.what();
+    }
+  }
+  EXPECT_GE(opened, 1);
 }
 
 TEST(Recording, DestructorWithoutFinishKeepsAllRows) {

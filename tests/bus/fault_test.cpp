@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <thread>
 
+#include "bus/fault_docs.hpp"
 #include "bus/hub.hpp"
 #include "bus/inproc.hpp"
 #include "bus/main_loop.hpp"
@@ -38,6 +41,11 @@ TEST(FaultText, SaysNodeKindAndTimes) {
   EXPECT_DOUBLE_EQ(parse_fault("drive C encoder_jump urad=30").value, 30e-6);
   EXPECT_EQ(parse_fault("probe wire_break channel=z").channel, 2);
   EXPECT_EQ(parse_fault("analysis kill wall_s=0.5").wall_s, 0.5);
+  const BusFault loss = parse_fault("supply power_loss from_s=2 for_s=0.4");
+  EXPECT_TRUE(loss.of_supply());
+  EXPECT_FALSE(loss.of_module() || loss.of_host());
+  EXPECT_EQ(loss.from, 2000);
+  EXPECT_EQ(loss.cycles, 400);
 }
 
 TEST(FaultText, WhatIsWrongIsNamed) {
@@ -47,15 +55,19 @@ TEST(FaultText, WhatIsWrongIsNamed) {
       {"drive Y quiet", "kinds are mute, silent"},
       {"drive Q mute", "\"drive Q\": no such node"},
       {"probe mute from_s=x", "from_s=x: expected a number"},
-      {"probe mute from_s=-1", "0 .. 1e+06"},
+      {"probe mute from_s=-1", "expected 0 or more"},
       {"probe mute from_s=nan", "from_s=nan: expected a number"},
       {"probe mute bit=3", "bit: unknown key; mute knows from_s, for_s"},
       {"probe mute 7", "expected key=value"},
       {"probe drop", "needs id="},
-      {"probe drop id=0x700", "1 .. 1791"},
+      {"probe drop id=0x780", "1 .. 1919"},
       {"probe drop id=0x080", "use lose_sync"},
       {"probe delay", "needs cycles="},
       {"drive X stuck", "stuck is a fault of the bus"},
+      {"bus power_loss", "power_loss is a fault of the supply"},
+      {"supply mute", "the supply knows power_loss"},
+      {"supply kill", "the supply knows power_loss"},
+      {"supply power_loss id=5", "power_loss knows from_s, for_s"},
       {"probe encoder_jump um=3", "is a fault of an axis drive"},
       {"drive spindle fault", "is a fault of an axis drive"},
       {"drive X encoder_jump", "needs um="},
@@ -63,6 +75,7 @@ TEST(FaultText, WhatIsWrongIsNamed) {
       {"overtravel wire_break", "is a fault of the probe"},
       {"NC unit lose_sync", "is a fault of modules"},
       {"bus babble", "is a fault of one node"},
+      {"NC unit bus_off", "is a fault of one module"},
       {"bus kill", "is a fault of a process"},
       {"analysis mute", "no such node"}};
   for (const auto& [text, message] : cases) {
@@ -320,6 +333,83 @@ TEST(Faults, InTheFutureChangeNothing) {
   for (BusFault& fault : later) fault.from += 10000;
   EXPECT_EQ(play_in_one_process(later).trace_hash, without)
       << "neither decorators nor tokens show on the bus";
+}
+
+/// Every kind at every node it may befall, with every key: text and data are the same thing.
+TEST(FaultText, ParsesToItselfForEveryKindAndNode) {
+  int count = 0;
+  for (const FaultKind& kind : fault_kinds())
+    for (const std::string_view node : nodes_of(kind)) {
+      BusFault fault{.node = std::string(node), .kind = kind.kind, .from = 1234, .cycles = 7};
+      const auto has = [&](std::string_view key) {
+        return kind.keys.find(key) != std::string_view::npos;
+      };
+      if (has("id")) fault.id = 0x187;
+      if (has("bit")) fault.bit = 13;
+      if (has("cycles") || has("frames") || has("periods")) fault.count = 5;
+      if (has("channel")) fault.channel = 2;
+      if (has("um")) fault.value = -125e-6;
+      if (has("wall_s")) fault.from = 0, fault.wall_s = 0.25;
+      for (const bool contact : {false, true}) {
+        fault.at_contact = contact && !fault.of_host();
+        if (fault.at_contact) fault.from = -20;
+        const std::string text = text_of(fault);
+        const BusFault again = parse_fault(text);
+        EXPECT_EQ(again.node, fault.node) << text;
+        EXPECT_EQ(again.kind, fault.kind) << text;
+        EXPECT_EQ(again.from, fault.from) << text;
+        EXPECT_EQ(again.cycles, fault.cycles) << text;
+        EXPECT_EQ(again.id, fault.id) << text;
+        EXPECT_EQ(again.bit, fault.bit) << text;
+        EXPECT_EQ(again.count, fault.count) << text;
+        EXPECT_EQ(again.channel, fault.channel) << text;
+        EXPECT_NEAR(again.value, fault.value, 1e-15) << text;
+        EXPECT_EQ(again.wall_s, fault.wall_s) << text;
+        EXPECT_EQ(again.at_contact, fault.at_contact) << text;
+        EXPECT_EQ(text_of(again), text);
+        ++count;
+      }
+    }
+  EXPECT_GT(count, 200);
+}
+
+TEST(FaultText, OnlyAtContactCountsBackwards) {
+  EXPECT_THROW(parse_fault("probe mute from_s=-0.1"), std::invalid_argument);
+  EXPECT_EQ(parse_fault("probe mute from_s=-0.1 at=contact").from, -100);
+  EXPECT_EQ(parse_fault("probe mute at=contact from_s=-0.1").from, -100);
+  EXPECT_THROW(parse_fault("probe mute at=start"), std::invalid_argument);
+  EXPECT_THROW(parse_fault("probe kill at=contact"), std::invalid_argument);
+  EXPECT_THROW(parse_fault("probe disk_full"), std::invalid_argument);
+  EXPECT_THROW(parse_fault("probe slip periods=0"), std::invalid_argument);
+}
+
+TEST(FaultFilter, KnowsWhichFaultsHaveStruck) {
+  const BusFaults faults{parse_fault("probe drop id=0x187 from_s=0.002"),
+                         parse_fault("probe drop id=0x555"), parse_fault("probe deaf from_s=1"),
+                         parse_fault("probe silent from_s=0.001 for_s=0.001")};
+  FaultFilter filter(faults, "probe");
+  Frame frame;
+  frame.id = 0x187;
+  Frames out;
+  const auto cycle = [&](Tick k) {
+    out.clear();
+    filter.hear(k, {}, out);
+    filter.say(k, {&frame, 1}, out);
+  };
+  cycle(0);
+  EXPECT_TRUE(filter.struck().empty());
+  cycle(1);
+  EXPECT_EQ(filter.struck(), std::vector<std::string>{faults[3].text});
+  cycle(2);
+  EXPECT_EQ(filter.struck(), (std::vector<std::string>{faults[0].text, faults[3].text}));
+}
+
+TEST(FaultDocs, ThePageInDocsIsTheGeneratedOne) {
+  std::ifstream in(std::string(VCNC_SOURCE_DIR) + "/docs/faults.md");
+  const std::string page{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_EQ(page, faults_markdown()) << "vcnc faults > docs/faults.md";
+  for (const FaultKind& kind : fault_kinds())
+    EXPECT_NE(page.find("| `" + std::string(kind.name) + "` |"), std::string::npos) << kind.name;
 }
 
 }  // namespace

@@ -111,7 +111,8 @@ TEST(MainLoop, NodeThatIsNotThereIsNamedAtTheStart) {
   const auto result =
       run_main_loop(master, bus, {{1, "drive X"}, {5, "drive C"}, {7, "probe"}}, {.pacer = pacer});
   EXPECT_FALSE(result.complete);
-  EXPECT_EQ(result.failure, "not on the bus within 15 s: drive C, probe");
+  EXPECT_EQ(result.failure,
+            "not on the bus within 15 s: drive C, probe; the machine starts no program without it");
   EXPECT_EQ(result.cycles, 0);
 }
 

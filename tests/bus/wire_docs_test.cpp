@@ -30,7 +30,7 @@ TEST(WireDocs, FieldsLieInsideTheirMessageWithoutOverlap) {
       }
     }
   }
-  EXPECT_EQ(names.size(), 9u);
+  EXPECT_EQ(names.size(), 12u);
 }
 
 TEST(WireDocs, MarkdownNamesEveryField) {
@@ -63,7 +63,7 @@ TEST(WireDocs, DbcHasEveryFrameOnceAndMarksFd) {
       if (name == "\"CANFD_BRS\"" && number == 1) fast_ids.insert(id);
     }
   }
-  EXPECT_EQ(length_by_id.size(), 2u + 8 + 6 + 2 + 1 + 8);
+  EXPECT_EQ(length_by_id.size(), 2u + 8 + 6 + 2 + 1 + 16 + 8 + 1);
   EXPECT_EQ(length_by_id.at(0x200), 64);
   EXPECT_EQ(length_by_id.at(0x187), 32);
   EXPECT_EQ(length_by_id.at(0x085), 8);

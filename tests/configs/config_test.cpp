@@ -114,6 +114,63 @@ INSTANTIATE_TEST_SUITE_P(
                     BadCase{"=3", "expected key=value"}, BadCase{"foo", "expected key=value"},
                     BadCase{"name=3", "expected a text in quotes"}));
 
+struct BadInjection {
+  std::vector<std::string> set;
+  std::vector<std::string> inject;
+  const char* message;
+};
+
+TEST(Config, EveryWrongInjectionIsOneSentenceThatSaysWhatIsAllowed) {
+  for (const BadInjection& bad : std::vector<BadInjection>{
+           {{},
+            {"X.backlash.gap_um=5 um"},
+            "--inject X.backlash.gap_um=5 um: effects.X.backlash.gap_um: expected a number in um, "
+            "0 .. 2000"},
+           {{},
+            {"X.backlash.gap_um="},
+            "--inject X.backlash.gap_um=: effects.X.backlash.gap_um: expected a number in um, 0 .. "
+            "2000"},
+           {{},
+            {"X.back lash=1"},
+            "--inject X.back lash=1: expected key=value with a key of words and points, and a "
+            "number, true, false, a text or a list as value"},
+           {{},
+            {"kinematics.c_axis_point_mm=3"},
+            "--inject kinematics.c_axis_point_mm=3: expected [x, y, z] in mm, or one component: "
+            "kinematics.c_axis_point_mm.x, kinematics.c_axis_point_mm.y, "
+            "kinematics.c_axis_point_mm.z"},
+           {{},
+            {"kinematics.c_axis_point_mm=[1, x, 3]"},
+            "--inject kinematics.c_axis_point_mm=[1, x, 3]: expected [x, y, z] in mm, or one "
+            "component: kinematics.c_axis_point_mm.x, kinematics.c_axis_point_mm.y, "
+            "kinematics.c_axis_point_mm.z"},
+           {{},
+            {"kinematics.c_axis_point_mm=[1, true, 3]"},
+            "--inject kinematics.c_axis_point_mm=[1, true, 3]: expected a number, -10000 .. 10000 "
+            "mm"},
+           {{},
+            {"X.backlash.gap_um=5", "effects.X.backlash.gap_um=6"},
+            "--inject effects.X.backlash.gap_um=6: the key is given twice"},
+           {{"effects.X.backlash.gap_um=5"},
+            {"X.backlash.gap_um=6"},
+            "--inject X.backlash.gap_um=6: the same is given by --set effects.X.backlash.gap_um; "
+            "one of them is too many"}})
+    EXPECT_EQ(error_of([&] { load_machine(kMachines + "trunnion.toml", bad.set, bad.inject); }),
+              bad.message);
+  // The declared number is set, its true value is injected: two numbers.
+  EXPECT_NO_THROW(
+      load_machine(kMachines + "trunnion.toml", {"axes.Y.load_kg=400"}, {"axes.Y.load_kg=550"}));
+}
+
+TEST(Config, AVectorDeviatesAsAWhole) {
+  const Machine m = load_machine(kMachines + "trunnion.toml", {},
+                                 {"kinematics.c_axis_point_mm=[0.01, -0.02, 0.03]"});
+  const Vec3 is = actual(m).kinematics.p_MC;
+  EXPECT_EQ(is, Vec3(0.01e-3, -0.02e-3, 0.03e-3));
+  EXPECT_NE(is, m.kinematics.p_MC);
+  EXPECT_EQ(m.effects.deviations.size(), 3u);
+}
+
 TEST(Config, MessagesNameFileAndLine) {
   EXPECT_EQ(error_of([] { parse_machine("name = \"a\"\n[axes.X]\nkv = 3\n", "m.toml"); }),
             "m.toml:3: axes.X.kv: unknown key; did you mean kv_per_s?");

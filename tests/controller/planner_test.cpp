@@ -14,6 +14,7 @@ constexpr double kAngleTolerance = 0.01 * kDegree;
 
 Machine test_machine() {
   Machine machine;
+  machine.probe.in_spindle = false;  // it would limit rapids and turning axes
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     AxisLimits& limits = machine.axes[i].limits;
     limits = is_rotary(i) ? AxisLimits{-10, 10, 0, 3.5, 35, 350} : AxisLimits{-1, 1, 0, 0.5, 5, 50};

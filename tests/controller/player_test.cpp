@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <stdexcept>
 
 #include "bus/tick.hpp"
 #include "configs/config.hpp"
@@ -192,6 +193,106 @@ TEST_P(RandomPrograms, AHoldBringsTheAxesToRestOnThePath) {
     }
     EXPECT_LE(nearest, 0.51) << "seed " << seed;  // between two cycles at full speed
   }
+}
+
+// Held at any moment and let go again: from the end of the rise on every set-point is the
+// uninterrupted program's to the bit, and on the way there no axis is driven harder than half its
+// limit besides what the program needs.
+TEST_P(RandomPrograms, GoesOnAfterAHoldAsIfNothingHadBeen) {
+  Machine machine = machine_of(GetParam());
+  machine.probe.in_spindle = false;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    RandomProgram random(seed);
+    const std::string text = random.text();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const ProgramFile file(text);
+    const std::vector<PlayerStep> whole = play_file(file.path(), machine);
+    const std::size_t at = 1 + (whole.size() - 2) * (seed % 11 + 1) / 12;
+    Player player(file.path(), machine);
+    std::vector<PlayerStep> steps;
+    for (std::size_t k = 0; k < at; ++k) steps.push_back(player.step());
+    player.hold();
+    const ProgramTime told = player.time();
+    const AxisVector rest = player.rest();
+    player.go_on();
+    EXPECT_FALSE(player.at_full_rate()) << "not before it is at rest";
+    while (!player.held()) steps.push_back(player.step());
+    for (int k = 0; k < 3; ++k) steps.push_back(player.step());
+    EXPECT_EQ(player.time().cycles, told.cycles) << "known from the beginning of the hold on";
+    EXPECT_EQ(player.time().on_path, told.on_path);
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      EXPECT_NEAR(steps.back().position[i], rest[i], 1e-15);
+    player.go_on();
+    std::size_t full = steps.size();
+    while (!steps.back().done && steps.size() < whole.size() + 20'000) {
+      steps.push_back(player.step());
+      if (!player.at_full_rate()) full = steps.size();
+    }
+    ASSERT_TRUE(steps.back().done);
+    // The end of both, back to the end of the rise.
+    std::size_t same = 0;
+    while (same < steps.size() - full && same < whole.size() &&
+           steps[steps.size() - 1 - same].position == whole[whole.size() - 1 - same].position &&
+           steps[steps.size() - 1 - same].velocity == whole[whole.size() - 1 - same].velocity &&
+           steps[steps.size() - 1 - same].line == whole[whole.size() - 1 - same].line)
+      ++same;
+    EXPECT_GE(same, steps.size() - full) << "of " << steps.size() << text;
+    EXPECT_GT(steps.size(), whole.size());
+    for (std::size_t k = at; k < steps.size(); ++k)
+      for (std::size_t i = 0; i < kAxisCount; ++i) {
+        const double change = steps[k].velocity[i] - steps[k - 1].velocity[i];
+        ASSERT_LE(std::abs(change) / kCycle, 1.6 * machine.axes[i].limits.acceleration)
+            << k << " axis " << kAxisNames[i];
+      }
+  }
+}
+
+// A player that was never there is taken to the place of one that was held, even while its feed was
+// rising after an earlier hold.
+TEST_P(RandomPrograms, ASoughtPlayerGoesOnLikeTheHeldOne) {
+  Machine machine = machine_of(GetParam());
+  machine.probe.in_spindle = false;
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    RandomProgram random(seed);
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const ProgramFile file(random.text());
+    const std::size_t length = play_file(file.path(), machine).size();
+    Player held(file.path(), machine);
+    for (std::size_t k = 0; k < 1 + (length - 2) * (seed % 7) / 7; ++k) held.step();
+    for (int again = 0; again < 3; ++again) {
+      held.hold();
+      while (!held.held()) held.step();
+      if (again == 2) break;
+      held.go_on();
+      for (unsigned k = 0; k < 5 + seed % 9; ++k) held.step();
+    }
+    Player sought(file.path(), machine);
+    sought.seek(held.time());
+    EXPECT_TRUE(sought.held());
+    EXPECT_EQ(sought.rest(), held.rest());
+    EXPECT_EQ(sought.time().cycles, held.time().cycles);
+    EXPECT_EQ(sought.time().on_path, held.time().on_path);
+    PlayerStep a = held.step(), b = sought.step();
+    held.go_on();
+    sought.go_on();
+    for (int k = 0; k < 100'000 && !(a.done && b.done); ++k) {
+      a = held.step();
+      b = sought.step();
+      for (std::size_t i = 0; i < kAxisCount; ++i) {
+        ASSERT_NEAR(a.position[i], b.position[i], 1e-12) << k;
+        ASSERT_NEAR(a.velocity[i], b.velocity[i], 1e-9) << k;
+      }
+      ASSERT_EQ(a.line, b.line);
+      ASSERT_EQ(a.spindle, b.spindle);
+    }
+    EXPECT_TRUE(a.done && b.done);
+  }
+}
+
+TEST(Player, CannotBeSoughtBeyondItsEnd) {
+  const ProgramFile file("G90 G21\nG1 X1 F1000\nM30\n");
+  Player player(file.path(), machine_of("trunnion"));
+  EXPECT_THROW(player.seek({1'000'000, 0}), std::out_of_range);
 }
 
 INSTANTIATE_TEST_SUITE_P(Player, RandomPrograms, testing::Values("trunnion", "head"));

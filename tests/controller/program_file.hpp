@@ -4,11 +4,12 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
 
-#include "controller/gcode.hpp"
+#include "controller/gcode/interpreter.hpp"
 
 namespace vcnc {
 
@@ -17,7 +18,9 @@ class ProgramFile {
  public:
   explicit ProgramFile(const std::string& text) {
     static int count = 0;
-    path_ = "program_" + std::to_string(getpid()) + "_" + std::to_string(count++) + ".nc";
+    const std::string name =
+        "program_" + std::to_string(getpid()) + "_" + std::to_string(count++) + ".nc";
+    path_ = (std::filesystem::temp_directory_path() / name).string();
     std::ofstream(path_, std::ios::binary) << text;
   }
   ~ProgramFile() { std::remove(path_.c_str()); }

@@ -137,7 +137,8 @@ struct Silent : TelemetrySink {
 };
 
 /// What the NC unit sends while every drive is ready; it is ready from cycle 10 on.
-std::vector<GroupCommand> commands(const Machine& machine, const std::string& text) {
+std::vector<GroupCommand> commands(Machine machine, const std::string& text) {
+  machine.bus.heartbeat_time = 0;  // nobody is there to produce them
   const ProgramFile file(text);
   Silent sink;
   NcUnit nc(as_nc_believes(machine), file.path(), sink);

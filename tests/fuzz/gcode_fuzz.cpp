@@ -2,7 +2,7 @@
 // The first byte chooses the machine.
 #include <variant>
 
-#include "controller/gcode.hpp"
+#include "controller/gcode/interpreter.hpp"
 #include "controller/player.hpp"
 #include "fuzz.hpp"
 
@@ -55,6 +55,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       for (const double v : step.velocity) fuzz::require(std::isfinite(v));
       if (step.done) break;
       if (cycle == 1500) player.hold();
+      if (cycle == 2000) player.go_on();
     }
   } catch (const ProgramError&) {
   }

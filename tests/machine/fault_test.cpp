@@ -51,11 +51,13 @@ struct FaultedRun {
   Witness seen;
   NcRunResult result;
 
-  FaultedRun(const std::string& program, const BusFaults& faults) {
+  FaultedRun(const std::string& program, const BusFaults& faults,
+             const std::vector<std::string>& sets = {}) {
     const TemporaryFile piece_file("fault-plane.toml", to_toml(piece));
-    machine = load_machine(
-        configs("machines/trunnion.toml"),
-        {"setup.piece=" + piece_file.path(), "axes.X.start_mm=130", "axes.Z.start_mm=250"});
+    std::vector<std::string> assignments{"setup.piece=" + piece_file.path(), "axes.X.start_mm=130",
+                                         "axes.Z.start_mm=250"};
+    assignments.insert(assignments.end(), sets.begin(), sets.end());
+    machine = load_machine(configs("machines/trunnion.toml"), assignments);
     modules = std::make_unique<VirtualMachine>(machine, &piece, 1, faults);
     InprocTransport transport(modules->nodes());
     const TemporaryFile file("fault.ngc", program);
@@ -182,7 +184,11 @@ INSTANTIATE_TEST_SUITE_P(
         Stopping{"drive C fault", 2105, "drive C"},
         Stopping{"probe wire_break", 1002, "signals are faulty"},
         Stopping{"probe wire_break channel=z", 1002, "signals are faulty"},
-        Stopping{"probe saturated channel=y", 1002, "signals are faulty"}),
+        Stopping{"probe saturated channel=y", 1002, "signals are faulty"},
+        Stopping{"probe stuck_adc", 1002, "signals are faulty"},
+        Stopping{"probe stuck_adc channel=y", 1002, "signals are faulty"},
+        Stopping{"probe slip periods=6", 1002, "jumped too far"},
+        Stopping{"probe slip channel=z periods=-50", 1002, "jumped too far"}),
     [](const auto& test) {
       std::string name = std::to_string(test.param.code) + "_" + test.param.fault;
       for (char& c : name)
@@ -208,7 +214,18 @@ INSTANTIATE_TEST_SUITE_P(DuringContact, RiddenThrough,
                                          "NC unit duplicate for_s=0.05",
                                          "drive X lose_sync for_s=0.002",
                                          "overtravel delay cycles=1", "drive Z babble frames=1",
-                                         "probe deaf"));
+                                         "probe deaf", "probe slip periods=4"));
+
+/// What stopped the machine is what the drive has said, not that it left operation afterwards.
+TEST(Faults, TheReasonIsTheCauseThatTheDriveHasSent) {
+  for (const auto& [fault, reason] : {std::pair{"drive C fault", "alarm 2105: "},
+                                      {"drive X encoder_jump um=25000", "alarm 2101: "}}) {
+    const FaultedRun run(scan(), from_contact_on(fault));
+    EXPECT_TRUE(run.result.end.reason.starts_with(reason)) << run.result.end.reason;
+    EXPECT_NE(run.result.end.reason.find("(program line "), std::string::npos);
+    EXPECT_TRUE(run.seen.has(2001, "")) << "and that it left operation is told, too";
+  }
+}
 
 TEST(Faults, AMuteOfThreeCyclesIsOneTooMany) {
   const FaultedRun run(scan(), from_contact_on("probe mute for_s=0.003"));
@@ -216,25 +233,42 @@ TEST(Faults, AMuteOfThreeCyclesIsOneTooMany) {
   EXPECT_EQ(run.seen.alarms.front().tick, in_contact() + 2) << "in the third cycle without it";
 }
 
-TEST(Faults, AStuckConverterBlindsTheReadingButNotTheMechanicalSwitch) {
-  // In the crash the reading stays where it was; only the probe's own protection unit is left.
+/// Miscounted from the beginning on, nothing jumps: the trip comes where the reading leaves the
+/// range.
+TEST(Faults, AWrongCountFromTheBeginningShiftsTheTripByItself) {
   const std::string crash = "G90 G21 G54\nM19\nG43 H1\nG0 X120 Y0 Z100\nG1 X60 F1000\nM30\n";
-  const FaultedRun healthy(crash, {});
-  EXPECT_TRUE(healthy.seen.has(1004, "")) << healthy.seen.told();
-  const FaultedRun run(crash, {parse_fault("probe stuck_adc")});
+  const auto deepest = [&](const BusFaults& faults) {
+    const FaultedRun run(crash, faults);
+    EXPECT_EQ(run.result.exit_code(), 3) << run.result.end.reason;
+    EXPECT_TRUE(run.seen.has(1004, "")) << run.seen.told();
+    EXPECT_TRUE(run.spindle_locked());
+    double most = 0;
+    for (const TelemetryRow& row : run.seen.rows)
+      most = std::max(most, 0.1 + run.machine.probe.ball_radius - row.q_act[kX]);
+    return most;
+  };
+  // 75 periods of 20 um; a cycle of 16.7 um more or less for the sample that shows it.
+  EXPECT_NEAR(deepest({parse_fault("probe slip periods=-75")}) - deepest({}), 1.5e-3, 20e-6);
+}
+
+/// With thresholds that a wrong machine file has made far too wide and a reading that is 1.5 mm
+/// short, the probe's own protection unit is left: a mechanical switch that feels the true force.
+TEST(Faults, TheMechanicalSwitchNeedsNoReading) {
+  const std::string crash = "G90 G21 G54\nM19\nG43 H1\nG0 X120 Y0 Z100\nG0 X60\nM30\n";
+  const FaultedRun run(crash, {parse_fault("probe slip periods=-75")},
+                       {"probe.range_mm=1.6", "probe.overtravel_lateral_mm=3",
+                        "probe.overtravel_force_lateral_N=60", "axes.X.velocity_mm_s=15"});
   EXPECT_EQ(run.result.exit_code(), 3) << run.result.end.reason;
   EXPECT_TRUE(run.seen.has(1002, "protection unit has switched")) << run.seen.told();
   EXPECT_EQ(run.moving(), "");
   EXPECT_TRUE(run.spindle_locked());
   double deepest = 0;
-  for (const TelemetryRow& row : run.seen.rows) {
-    EXPECT_EQ(row.deflection[0], 0);
+  for (const TelemetryRow& row : run.seen.rows)
     deepest = std::max(deepest, 0.1 + run.machine.probe.ball_radius - row.q_act[kX]);
-  }
   const double limit =
       std::min(run.machine.probe.overtravel_lateral,
                run.machine.probe.overtravel_force_lateral / run.machine.probe.spring_rate);
-  // Sample, judgement, quick stop and half a cycle each side: 4 cycles at 16.7 mm/s, and braking.
+  // Sample, judgement, quick stop and half a cycle each side: 4 cycles at 15 mm/s, and braking.
   EXPECT_GT(deepest, limit - 1e-5);
   EXPECT_LT(deepest, limit + 0.2e-3);
 }

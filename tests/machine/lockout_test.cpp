@@ -5,6 +5,8 @@
 #include <cmath>
 #include <set>
 
+#include "apps/fault_draw.hpp"
+#include "apps/lockout_fault.hpp"
 #include "apps/lockout_page.hpp"
 #include "apps/lockout_random.hpp"
 #include "apps/lockout_report.hpp"
@@ -118,6 +120,51 @@ TEST(Lockout, ADrawnRunIsTheSameAloneAndFromItsFile) {
   }
 }
 
+/// Every simulated kind at every node, once.
+TEST(Lockout, CrashesWithAnyFaultEndSafely) {
+  const std::size_t pairs = FaultDraw::pairs().size();
+  LockoutOptions options{
+      .seed = 8, .crashes = 0, .ordinary = 0, .faulted = pairs, .machines = shipped()};
+  const auto items = lockout_items(options);
+  const auto verdicts = LockoutRunner{}.run(items);
+  const LockoutSummary s = summarise(verdicts);
+  EXPECT_EQ(s.faulted, pairs);
+  EXPECT_EQ(s.unsafe, 0u) << told(verdicts);
+  std::set<std::pair<std::string, BusFault::Kind>> covered;
+  std::size_t late = 0;
+  for (const LockoutVerdict& v : verdicts) {
+    for (const std::string& text : v.faults) {
+      const BusFault fault = parse_fault(text);
+      covered.insert({fault.node, fault.kind});
+      late += fault.from >= static_cast<Tick>(v.cycles);
+    }
+  }
+  EXPECT_EQ(covered.size() + s.refused, pairs) << "all but those of refused programs";
+  EXPECT_LT(late, pairs / 5) << "faults come while there is something to disturb";
+}
+
+/// at=contact means the first cycle that shows a deflection, as a run without the fault has it.
+TEST(Lockout, AFaultAtContactComesWhenTheBallTouches) {
+  Scenario s = scenario(Kind::program_error, Expect::fault_safe, 6e-3);
+  s.feed = 20e-3;
+  s.faults = {"drive A duplicate at=contact from_s=-0.005", "probe mute at=contact from_s=0.02"};
+  const Played faulted = run_one(s);
+  EXPECT_TRUE(faulted.verdict.passed()) << told({faulted.verdict});
+  ASSERT_EQ(faulted.verdict.faults.size(), 2u);
+  const auto touch =
+      std::find_if(faulted.log.begin(), faulted.log.end(),
+                   [](const TripCycle& c) { return c.deflection.back().norm() > 1e-6; }) -
+      faulted.log.begin();
+  EXPECT_EQ(parse_fault(faulted.verdict.faults[0]).from, touch - 5);
+  EXPECT_EQ(parse_fault(faulted.verdict.faults[1]).from, touch + 20);
+  const auto& alarms = faulted.verdict.end.alarms;
+  ASSERT_FALSE(alarms.empty());
+  const auto silent =
+      std::find_if(alarms.begin(), alarms.end(), [](const Alarm& a) { return a.code == 3202; });
+  ASSERT_NE(silent, alarms.end());
+  EXPECT_EQ(silent->tick, touch + 20 + 2) << "in the third cycle without it";
+}
+
 // ------------------------------------------------------------------------------ the kinds
 
 TEST(Lockout, EveryShippedScenarioEndsAsItSays) {
@@ -135,7 +182,8 @@ TEST(Lockout, EveryKindDrivesTheBallAsDeepAsItSays) {
   for (const char* machine : {"trunnion", "head"})
     for (const Kind kind : {Kind::program_error, Kind::wrong_offset, Kind::wrong_length,
                             Kind::not_retracted, Kind::rotary}) {
-      const Scenario s = scenario(kind, Expect::none, 1.2e-3, machine);
+      Scenario s = scenario(kind, Expect::none, 1.2e-3, machine);
+      s.rotary_feed = 0.1;  // the head has a lever of 350 mm
       const Played run = run_one(s);
       EXPECT_TRUE(run.verdict.passed()) << told({run.verdict});
       EXPECT_NEAR(run.log.back().deflection.back().norm(), 1.2e-3,
@@ -280,6 +328,59 @@ class Judgement : public testing::Test {
   Machine machine_;
 };
 
+/// The judgement of a run with a fault, spoilt in one place.
+TEST(FaultedJudgement, FindsWhatIsNotSafe) {
+  Scenario s = scenario(Kind::program_error, Expect::fault_safe, 6e-3);
+  s.feed = 20e-3;
+  s.faults = {"probe mute at=contact from_s=0.02"};
+  const Played good = run_one(s);
+  const LockoutCase the_case = make_case(s);
+  const BusFaults faults{parse_fault(good.verdict.faults.at(0))};
+  const auto spoilt = [&](const std::function<void(TripLog&, TripEnd&)>& spoil) {
+    TripLog log = good.log;
+    TripEnd end = good.verdict.end;
+    spoil(log, end);
+    std::string text;
+    for (const std::string& sentence :
+         judge_faulted(s, the_case, faults, log, measure(log, the_case.machine), end))
+      text += sentence + "\n";
+    return text;
+  };
+  const auto says = [](const std::string& text, const char* what) {
+    return text.find(what) != std::string::npos;
+  };
+  EXPECT_EQ(spoilt([](TripLog&, TripEnd&) {}), "");
+  EXPECT_TRUE(says(spoilt([](TripLog& log, TripEnd&) { log.back().axes[0] += 1e-3; }),
+                   "axis X still moves"));
+  EXPECT_TRUE(
+      says(spoilt([](TripLog& log, TripEnd&) { log.back().lock = false; }), "neither locked"));
+  EXPECT_TRUE(says(spoilt([](TripLog& log, TripEnd&) {
+                     for (TripCycle& c : log) c.spindle_safe = false;
+                   }),
+                   "when the axes stood still"));
+  EXPECT_TRUE(says(spoilt([](TripLog& log, TripEnd&) {
+                     log[log.size() / 2].protection = OvertravelState::State::hard;
+                     log.back().protection = OvertravelState::State::normal;
+                   }),
+                   "not latched"));
+  EXPECT_TRUE(says(spoilt([](TripLog&, TripEnd& end) { end.alarms.clear(); }), "no alarm names"));
+  EXPECT_TRUE(says(spoilt([](TripLog&, TripEnd& end) { end.run_down = -1; }), "come to rest"));
+  EXPECT_TRUE(says(spoilt([](TripLog&, TripEnd& end) { end.spindle_stays_locked = false; }),
+                   "could be started"));
+  EXPECT_TRUE(says(spoilt([](TripLog& log, TripEnd&) {
+                     for (std::size_t k = log.size() / 3; k < log.size(); ++k)
+                       log[k].deflection.fill(Vec3(16e-3, 0, 0));
+                   }),
+                   "of the mechanical limit"));
+  EXPECT_TRUE(says(spoilt([](TripLog& log, TripEnd&) {
+                     for (TripCycle& c : log) {
+                       c.nc_alarm = c.left_operation = false;
+                       c.deflection.fill(Vec3(3e-3, 0, 0));
+                     }
+                   }),
+                   "the axes do not brake"));
+}
+
 TEST_F(Judgement, OfAGoodRunIsEmpty) {
   EXPECT_EQ(spoilt([](TripLog&, TripEnd&) {}), "");
 }
@@ -326,10 +427,17 @@ TEST_F(Judgement, FindsWhatIsNotLatchedLockedRecordedOrWithinTheLimit) {
 
 // ------------------------------------------------------------------------------ input, output
 
-TEST(Lockout, FaultsAreRefusedUntilTheyArePossible) {
+TEST(Lockout, WrongFaultsAreRefused) {
   Scenario s = scenario(Kind::program_error, Expect::trip, 6e-3);
-  s.faults = {"probe mute from_s=1"};
-  EXPECT_THROW(make_case(s), InputError);
+  for (const char* fault : {"probe", "probe mute from_s=-1", "drive X kill at=contact",
+                            "drive X kill wall_s=1", "probe mute at=end", "bus slip"}) {
+    s.faults = {fault};
+    EXPECT_THROW(make_case(s), InputError) << fault;
+  }
+  s.faults = {"probe mute at=contact from_s=-0.01"};
+  EXPECT_NO_THROW(make_case(s));
+  Scenario none = scenario(Kind::program_error, Expect::fault_safe, 6e-3);
+  EXPECT_THROW(check_scenario(none, "f"), ConfigError);
 }
 
 TEST(Lockout, WhatCannotBeMadeIsSaid) {

@@ -107,29 +107,5 @@ TEST(Protection, NeverRelaxesByItself) {
   }
 }
 
-TEST(StoppingDistance, ReactionAndBraking) {
-  // 50 mm/s, 4 ms, 1 m/s^2: 1.45 mm; 100 mm/s: 5.4 mm
-  EXPECT_NEAR(stopping_distance(0.05, 4e-3, 1), 1.45e-3, 1e-12);
-  EXPECT_NEAR(stopping_distance(0.1, 4e-3, 1), 5.4e-3, 1e-12);
-}
-
-TEST(LargestProbingSpeed, StopsBetweenTheHardStageAndTheLimit) {
-  // Default probe, 1 m/s^2, 4 ms: axially 5 - 1.25 (2 + 10 g / 135 g/mm) mm remain.
-  const ProbeParams probe;
-  const double axial = 5e-3 - 1.25 * (2e-3 + 0.010 * 9.80665 / 1324);
-  const auto way_at = [&](const Vec3& way) {
-    return stopping_distance(largest_probing_speed(probe, way, 4e-3, 1), 4e-3, 1);
-  };
-  EXPECT_NEAR(way_at(Vec3::UnitZ()), axial, 1e-9);
-  EXPECT_NEAR(way_at({0.6, 0, 0.8}), axial / 0.9, 1e-9);
-  // Across, a surface at 45 deg turns half of the way into axial deflection.
-  EXPECT_NEAR(way_at(Vec3::UnitX()), 2 * axial, 1e-9);
-}
-
-TEST(LargestProbingSpeed, KeepsThePeriodsCountable) {
-  // 20 um every 200 us, however well the axes brake.
-  EXPECT_NEAR(largest_probing_speed(ProbeParams{}, Vec3::UnitX(), 4e-3, 100), 0.1, 1e-12);
-}
-
 }  // namespace
 }  // namespace vcnc

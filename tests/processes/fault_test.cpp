@@ -100,6 +100,86 @@ TEST_F(FaultyProcesses, AStoppedModuleOfAnyKindEndsSafelyByName) {
   }
 }
 
+/// The program started again takes no part: the run ends as if it had died, the rest stands.
+TEST_F(FaultyProcesses, ARestartedModuleTakesNoPartAndIsNamed) {
+  for (const std::string node : {"drive Y", "overtravel", "NC unit"}) {
+    const std::string fault = node + " restart from_s=0.6";
+    const Said said = run("run", "--pace 2 --answer-timeout-s 0.5 --fault \"" + fault + "\"");
+    expect_failed_by_name(fault, node, said);
+    EXPECT_NE(said.err.find("started again"), std::string::npos) << said.err;
+    expect_alarm(summary("run"), node);
+    expect_run_down(scratch_, node);
+    if (node == "NC unit") {
+      EXPECT_NE(read_text(scratch_ / "run/notes.txt").find("the spindle is locked"),
+                std::string::npos);
+    }
+  }
+}
+
+TEST_F(FaultyProcesses, AFullDiskStopsTheRunAndTheRecordingUpToThereOpens) {
+  const Said said = run("run", "--pace 4 --fault \"analysis disk_full from_s=2\"");
+  EXPECT_EQ(said.code, 1);
+  EXPECT_NE(said.err.find("analysis"), std::string::npos) << said.err;
+  EXPECT_EQ(leftovers(), "");
+  EXPECT_NE(said.err.find("recording"), std::string::npos)
+      << "it says what could not be written: " << said.err;
+  const Said again = shell(
+      scratch_, bin("vcnc") + " analyze " + (scratch_ / "run") + " --out " + (scratch_ / "again"));
+  EXPECT_EQ(again.code, 0) << again.err;
+  EXPECT_GT(std::stol(json_value(read_text(scratch_ / "again/summary.json"), "rows")), 1000);
+}
+
+/// A reader that stalls changes nothing but what it has missed itself.
+TEST_F(FaultyProcesses, AStalledReaderMissesRowsThatAreCounted) {
+  write_text(scratch_ / "moving.ngc",
+             "G90 G21\nM19\nG43.4 H1\nG1 X100 Y50 A3 C4 F6000\nX-100\nM30\n");
+  ASSERT_EQ(run("reference", "--in-process").code, 0);
+  const Said said = run("run", "--pace 2 --fault \"analysis stop from_s=0.6 for_s=1\"");
+  EXPECT_EQ(said.code, 0) << said.err;
+  EXPECT_EQ(json_value(summary("run"), "trace_hash"),
+            json_value(summary("reference"), "trace_hash"));
+  const auto number = [&](const char* key) { return std::stol(json_value(summary("run"), key)); };
+  EXPECT_EQ(number("rows") + number("gaps"), number("cycles")) << "what it missed is counted";
+}
+
+TEST_F(FaultyProcesses, FaultsThatNeverStrikeAreToldAndAllAreKept) {
+  write_text(scratch_ / "moving.ngc", "G90 G21\nM19\nG43.4 H1\nG1 X10 F3000\nM30\n");
+  const std::string faults =
+      "--fault \"probe mute from_s=1000\" --fault \"drive Y drop id=0x555\" "
+      "--fault \"drive Y duplicate from_s=0.3 for_s=0.002\"";
+  for (const std::string layout : {"--in-process ", ""}) {
+    const Said said = run("run", layout + faults);
+    EXPECT_EQ(said.code, 0) << said.err;
+    EXPECT_NE(said.err.find("\"probe mute from_s=1000\": had no effect"), std::string::npos)
+        << said.err;
+    EXPECT_NE(said.err.find("id=0x555\": had no effect"), std::string::npos) << said.err;
+    EXPECT_EQ(said.err.find("duplicate"), std::string::npos) << said.err;
+    EXPECT_EQ(read_text(scratch_ / "run/faults.txt"),
+              "probe mute from_s=1000\ndrive Y drop id=0x555\ndrive Y duplicate from_s=0.3 "
+              "for_s=0.002\n");
+  }
+}
+
+TEST_F(FaultyProcesses, RandomFaultsAreThoseOfTheSeed) {
+  write_text(scratch_ / "moving.ngc", "G90 G21\nM19\nG43.4 H1\nG1 X10 F3000\nM30\n");
+  const auto faults = [&](const std::string& seed, const std::string& out) {
+    run(out, "--in-process --random-faults 4 --seed " + seed);
+    return read_text(scratch_ / (out + "/faults.txt"));
+  };
+  const std::string one = faults("3", "a");
+  EXPECT_EQ(std::count(one.begin(), one.end(), '\n'), 4);
+  EXPECT_EQ(faults("3", "b"), one);
+  EXPECT_EQ(json_value(summary("a"), "trace_hash"), json_value(summary("b"), "trace_hash"));
+  EXPECT_NE(faults("4", "c"), one);
+  const Said revealed = shell(scratch_, bin("vcnc") + " compare " + (scratch_ / "a") + " " +
+                                            (scratch_ / "c") + " --reveal");
+  EXPECT_EQ(revealed.code, 0) << revealed.err;
+  EXPECT_NE(revealed.out.find(one.substr(0, one.find('\n'))), std::string::npos) << revealed.out;
+  const Said same = shell(scratch_, bin("vcnc") + " compare " + (scratch_ / "a") + " " +
+                                        (scratch_ / "b") + " --reveal");
+  EXPECT_NE(same.out.find("nothing differs"), std::string::npos) << same.out;
+}
+
 TEST_F(FaultyProcesses, ASlowModuleDoesNotChangeTheHash) {
   write_text(scratch_ / "moving.ngc", "G90 G21\nM19\nG43.4 H1\nG1 X30 Y20 A3 C4 F6000\nM30\n");
   ASSERT_EQ(run("reference", "--in-process").code, 0);

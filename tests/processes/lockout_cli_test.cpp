@@ -55,11 +55,11 @@ TEST_F(LockoutCli, ASmallSuitePassesAndWritesItsResults) {
               (scratch_ / "r.xml") + " --html " + (scratch_ / "r.html"));
   ASSERT_EQ(said.code, 0) << said.out << said.err;
   EXPECT_NE(said.out.find("PASS"), std::string::npos);
-  EXPECT_EQ(json_value(read_text(scratch_ / "r.json"), "runs"), "16");
+  EXPECT_EQ(json_value(read_text(scratch_ / "r.json"), "runs"), "24");
   EXPECT_EQ(json_value(read_text(scratch_ / "r.json"), "missed"), "0");
   const std::string junit = read_text(scratch_ / "r.xml");
   EXPECT_EQ(xml_fault(junit), "");
-  EXPECT_NE(junit.find("<testsuites name=\"vcnc lockout\" tests=\"16\" failures=\"0\""),
+  EXPECT_NE(junit.find("<testsuites name=\"vcnc lockout\" tests=\"24\" failures=\"0\""),
             std::string::npos);
   const std::string page = read_text(scratch_ / "r.html");
   EXPECT_NE(page.find("</html>"), std::string::npos);
@@ -93,6 +93,31 @@ TEST_F(LockoutCli, BadInputIsExitCodeTwoAndOneSentence) {
   }
 }
 
+/// A scenario that could not run on any machine is a mistake, not a finding.
+TEST_F(LockoutCli, AScenarioThatCannotRunIsBadInputAndNamesItsFile) {
+  const std::string head = "machine = \"" + configs("machines/trunnion.toml") + "\"\n";
+  write_text(scratch_ / "inject.toml",
+             head + "kind = \"program_error\"\ninject = [\"X.backlsh.gap_um=3\"]\n");
+  write_text(scratch_ / "gcode.toml",
+             head + "expect = \"trip\"\ngcode = \"G90\\nG1 X1 Q7\\nM30\"\n");
+  write_text(scratch_ / "bad.ngc", "G90\nG1 X9999 F100\nM30\n");
+  write_text(scratch_ / "program.toml", head + "program = \"bad.ngc\"\n");
+  for (const auto& [file, message] :
+       {std::pair{"inject.toml", "inject.toml: --inject X.backlsh.gap_um=3: "},
+        {"gcode.toml", "gcode.toml: gcode:2: "},
+        {"program.toml", "program.toml: "}}) {
+    const Said said = lockout(scratch_ / file);
+    EXPECT_EQ(said.code, 2) << said.out << said.err;
+    EXPECT_NE(said.err.find(message), std::string::npos) << said.err;
+    EXPECT_EQ(std::count(said.err.begin(), said.err.end(), '\n'), 1) << said.err;
+  }
+  EXPECT_NE(lockout(scratch_ / "program.toml").err.find("bad.ngc:2: "), std::string::npos);
+  // What only the probe forbids is what such a scenario is about.
+  write_text(scratch_ / "fast.toml",
+             head + "expect = \"refused\"\ngcode = \"G43.4 H1\\nG1 X90 F30000\\nM30\"\n");
+  EXPECT_EQ(lockout(scratch_ / "fast.toml").code, 0);
+}
+
 TEST_F(LockoutCli, OneRunIsRepeatedIntoAFolderThatVcncRunRepeats) {
   ASSERT_EQ(lockout("--only crash-1 --seed 2 --out " + (scratch_ / "one") + " --json " +
                     (scratch_ / "r.json"))
@@ -113,10 +138,24 @@ TEST_F(LockoutCli, OneRunIsRepeatedIntoAFolderThatVcncRunRepeats) {
   EXPECT_EQ(json_value(read_text(scratch_ / "again/summary.json"), "trace_hash"), hash);
 }
 
+TEST_F(LockoutCli, RealProcessesEndSafelyWhateverDiesWhenever) {
+  const Said said =
+      lockout("--processes 10 --seed 6 --jobs 2 --json " + (scratch_ / "r.json") + " --junit " +
+              (scratch_ / "r.xml") + " --html " + (scratch_ / "r.html"));
+  EXPECT_EQ(said.code, 0) << said.out << said.err;
+  const std::string json = read_text(scratch_ / "r.json");
+  EXPECT_EQ(json_value(json, "processes"), "10");
+  EXPECT_EQ(json_value(json, "as_expected"), "10");
+  EXPECT_EQ(xml_fault(read_text(scratch_ / "r.xml")), "");
+  EXPECT_NE(read_text(scratch_ / "r.xml").find("lockout.processes"), std::string::npos);
+  EXPECT_NE(read_text(scratch_ / "r.html").find("Real processes"), std::string::npos);
+}
+
 TEST_F(LockoutCli, TheListShowsKindsAndKeys) {
   const Said said = lockout("--list");
   EXPECT_EQ(said.code, 0);
-  for (const char* word : {"wrong_offset", "not_retracted", "`depth_mm`", "safe"})
+  for (const char* word : {"wrong_offset", "not_retracted", "`depth_mm`", "safe", "fault_safe",
+                           "at=contact", "| `stuck_adc` |"})
     EXPECT_NE(said.out.find(word), std::string::npos) << word;
 }
 

@@ -287,7 +287,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"NoMachine", "{S}short.ngc --machine {S}none.toml --out {S}out", 2,
                  "none.toml: cannot be opened"},
         BadInput{"NoProgram", "{S}none.ngc --machine {M} --out {S}out", 2, "none.ngc"},
-        BadInput{"ErrorInTheMiddle", "{S}error.ngc --machine {M} --out {S}out", 2, "error.ngc:4: "},
+        BadInput{"ErrorInTheMiddle", "{S}error.ngc --machine {M} --out {S}out", 2,
+                 "error.ngc:4:1: "},
         BadInput{"AxisLimit", "{S}far.ngc --machine {M} --out {S}out", 2, "far.ngc:3: "},
         BadInput{"NoPiece", "{GOOD} --set setup.piece={S}none.toml", 2,
                  "none.toml: cannot be opened"},
@@ -305,6 +306,29 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"ForeignFolder", "{S}short.ngc --machine {M} --out {S}mine", 2,
                  "holds other files"}),
     [](const auto& test) { return test.param.name; });
+
+TEST_F(Vcnc, AnEmptyValueIsAMistake) {
+  for (const char* arguments :
+       {"run '' --machine m.toml --out o", "run p.ngc --machine m.toml --out ''",
+        "run p.ngc --machine m.toml --out o --set ''", "lockout --only ''", "lockout --html ''",
+        "gallery --out o --only ''", "compare a b --out ''", "program step --machine m --out ''"}) {
+    const Said said = shell(scratch_, bin("vcnc") + " " + arguments);
+    EXPECT_EQ(said.code, 2) << arguments;
+    EXPECT_NE(said.err.find(": needs a value, \"\" is none"), std::string::npos) << said.err;
+  }
+}
+
+TEST_F(Vcnc, AnEffectWithNothingToActOnIsToldAtTheBegin) {
+  const std::string run = bin("vcnc") + " run " + (scratch_ / "short.ngc") + " --machine " +
+                          configs("machines/trunnion.toml") + " --in-process --no-report --out " +
+                          (scratch_ / "idle") + " --inject X.presliding.stiffness_N_per_um=25";
+  const Said idle = shell(scratch_, run);
+  EXPECT_EQ(idle.code, 0) << idle.err;
+  EXPECT_NE(idle.err.find("warning: effects.X.presliding: does nothing"), std::string::npos)
+      << idle.err;
+  EXPECT_EQ(shell(scratch_, run + " --inject X.coulomb.level_N=50").err.find("warning"),
+            std::string::npos);
+}
 
 TEST_F(Vcnc, EveryProgramExplainsItself) {
   for (const char* program :

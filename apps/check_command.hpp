@@ -1,0 +1,18 @@
+// `vcnc check`: can the machine run a program?
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace vcnc {
+
+struct CheckOptions {
+  std::vector<std::string> programs, assignments;
+  std::string machine;
+};
+
+/// Runs the whole interpretation and, with a machine, every check before motion: travel, feeds,
+/// interlocks. Throws ProgramError for the first program that is refused.
+void check_command(const CheckOptions& options);
+
+}  // namespace vcnc

@@ -1,0 +1,81 @@
+#include "apps/plan_command.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+
+#include "bus/tick.hpp"
+#include "configs/config.hpp"
+#include "controller/limit_use.hpp"
+#include "controller/player.hpp"
+
+namespace vcnc {
+namespace {
+
+/// Every cycle as one line of a CSV file.
+class PlanCsv {
+ public:
+  explicit PlanCsv(const std::string& path) : path_(path) {
+    if (path_.empty()) return;
+    file_.open(path_, std::ios::binary);
+    if (!file_) fail();
+    file_ << "time_s,X_mm,Y_mm,Z_mm,A_deg,C_deg,tip_X_mm,tip_Y_mm,tip_Z_mm,feed_mm_min,line\n";
+  }
+
+  void add(Tick cycle, const PlayerStep& step) {
+    if (path_.empty()) return;
+    text_.clear();
+    const auto out = std::back_inserter(text_);
+    fmt::format_to(out, "{:.3f}", seconds(cycle));
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      fmt::format_to(out, ",{:.7f}", step.position[i] / (is_rotary(i) ? kDegree : 1e-3));
+    for (const double x : step.tip) fmt::format_to(out, ",{:.7f}", x * 1e3);
+    fmt::format_to(out, ",{:.4f},{}\n", step.feed * 60e3, step.line);
+    file_ << text_;
+  }
+
+  void close() {
+    if (path_.empty()) return;
+    file_.close();
+    if (!file_) fail();
+  }
+
+ private:
+  [[noreturn]] void fail() const { throw InputError(path_ + ": cannot be written"); }
+
+  std::string path_, text_;
+  std::ofstream file_;
+};
+
+}  // namespace
+
+void plan_command(const PlanOptions& options) {
+  const Machine machine = load_machine(options.machine, options.assignments);
+  try {
+    Player player(options.program, machine);
+    AxisVector start;
+    for (std::size_t i = 0; i < kAxisCount; ++i) start[i] = machine.axes[i].limits.start;
+    LimitUse use(machine, start);
+    PlanCsv csv(options.csv);
+    Tick cycles = 0, waiting = 0;
+    for (PlayerStep step = player.step(); !step.done; step = player.step()) {
+      use.add(step.position);
+      csv.add(++cycles, step);
+      waiting += step.dwell;
+    }
+    csv.close();
+    std::cout << fmt::format("total time {:.3f} s, of which {:.3f} s waiting\n", seconds(cycles),
+                             seconds(waiting));
+    std::cout << "largest share of the limits   v [%]   a [%]   j [%]\n";
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      std::cout << fmt::format("{:<27}{:8.1f}{:8.1f}{:8.1f}\n", kAxisNames[i],
+                               use.share(i, 1) * 100, use.share(i, 2) * 100, use.share(i, 3) * 100);
+  } catch (const ProgramError& e) {
+    throw InputError(e.what());
+  }
+}
+
+}  // namespace vcnc

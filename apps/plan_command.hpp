@@ -1,0 +1,17 @@
+// `vcnc plan`: what the NC unit will command for a program, without running the machine.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace vcnc {
+
+struct PlanOptions {
+  std::string program, machine, csv;  ///< csv: where every cycle goes; empty: nowhere
+  std::vector<std::string> assignments;
+};
+
+/// Prints the total time and what share of its limits every axis uses. Throws InputError.
+void plan_command(const PlanOptions& options);
+
+}  // namespace vcnc

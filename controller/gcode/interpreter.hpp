@@ -1,0 +1,56 @@
+// G-code to typed blocks: the words of a line change the modal state, and what remains to be done
+// is a Move, a Dwell, a spindle word, a stop or the end. What is understood: docs/gcode.md.
+//
+// Coordinates. Without RTCP, X Y Z are axis positions in the active work offset. Under G43.4
+// (G43.5, TRAORI) they are the controlled point in the workpiece frame of the active offset, under
+// G68.2 in a plane tilted in it. A and C are always positions of the rotary axes [deg].
+//
+// At the start: G17 G21 G40 G49 G54 G64 G80 G90 G91.1 G94 G97 G98, no feed. M0 holds for
+// kProgramStopSeconds (the operator of a virtual machine presses start at once); the switch for the
+// optional stop M1 is off, so M1 only brings the axes to rest. What follows M2, M30 or the second %
+// is not read; a file without an end is refused.
+//
+// Memory does not grow with the program (but with its O words), and a program that computes
+// without end is refused: kMostPasses of loops, calls and jumps.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "controller/gcode/tool_table.hpp"
+#include "controller/gcode_blocks.hpp"
+
+namespace vcnc {
+
+inline constexpr double kProgramStopSeconds = 1.0;
+
+struct InterpreterOptions {
+  enum class Dialect { automatic, ngc, fanuc, siemens };
+  Dialect dialect = Dialect::automatic;
+  std::optional<ToolTable> tools;  ///< instead of those of the machine
+  bool block_delete = false;       ///< lines that begin with / are skipped
+  bool bare = false;               ///< no machine: any spindle speed, no tools, no probe
+};
+
+class ProgramRun;
+
+/// Reads a program block by block with bounded memory.
+class GcodeInterpreter {
+ public:
+  static constexpr long kMostPasses = 2'000'000;
+
+  /// Throws ProgramError where the file cannot be read or its O words do not fit together.
+  GcodeInterpreter(const std::string& path, const Machine& machine,
+                   InterpreterOptions options = {});
+  ~GcodeInterpreter();
+
+  /// The next block; ProgramEnd is the last one and is repeated. Throws ProgramError
+  /// ("FILE:LINE:COLUMN: reason").
+  Block next();
+
+ private:
+  std::unique_ptr<ProgramRun> run_;
+};
+
+}  // namespace vcnc

@@ -1,0 +1,209 @@
+// The inside of the interpreter, shared by its source files.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/gcode/block_words.hpp"
+#include "controller/gcode/cutter_compensation.hpp"
+#include "controller/gcode/expression.hpp"
+#include "controller/gcode/flow_index.hpp"
+#include "controller/gcode/interpreter.hpp"
+#include "controller/gcode/parameters.hpp"
+#include "controller/gcode/work_coordinates.hpp"
+
+namespace vcnc {
+
+/// What holds until something else is said.
+struct GcodeModal {
+  enum class Length { none, offset, rtcp, vector };
+  int motion = 800;  ///< G code in tenths
+  std::size_t normal = kZ;
+  double length_unit = 1e-3;
+  bool absolute = true, arc_absolute = false;
+  int feed = 940;
+  bool exact = false;
+  double tolerance = 0;
+  bool to_initial = true;       ///< G98
+  bool constant_speed = false;  ///< G96
+  Length length = Length::none;
+  double tool_length = 0;                   ///< of the RTCP frame
+  double linear_feed = 0, rotary_feed = 0;  ///< [m/s], [rad/s] (G93: 1/s; G95: m per turn); 0: none
+  double spindle_speed = 0;                 ///< [rad/s]
+  int spindle = 5;                          ///< M3, M4, M5, M19
+};
+
+/// R, Z, Q, P of canned cycles hold while cycles follow each other.
+struct CycleWords {
+  std::optional<double> r, z, q, p;
+  int code = -1;                  ///< of the last one
+  std::optional<double> initial;  ///< height before the first of them
+};
+
+class ProgramRun : public SystemParameters {
+ public:
+  ProgramRun(const std::string& path, const Machine& machine, InterpreterOptions options);
+  Block next();
+
+ private:
+  using Dialect = InterpreterOptions::Dialect;
+  using Flow = FlowLine::Kind;
+
+  struct Unit {
+    explicit Unit(const std::string& path) : text(path), flow(text) {}
+    ProgramText text;
+    FlowIndex flow;
+    bool opened = false;  ///< its first % was seen
+  };
+  struct Counter {
+    int begin;
+    long left;
+  };
+  struct Call {
+    std::size_t unit = 0;
+    ProgramPlace back;   ///< where the caller goes on
+    ProgramPlace begin;  ///< of the program called, for repeats
+    long repeats = 0;    ///< still to do
+    bool macro = false;  ///< M98 or G65: ends with M99
+    bool own_locals = false;
+    LocalParameters locals;  ///< of the caller
+    std::vector<Counter> counters;
+    std::optional<GcodeModal> modal;  ///< M73
+  };
+
+  // reading: interpreter.cpp
+  void read_line();
+  bool read_words(Cursor& at);
+  void read_letter(Cursor& at);
+  bool read_keyword(Cursor& at);
+  void read_assignment(Cursor& at);
+  void apply_assignments();
+  void execute();
+  void end_of_file();
+  void finish();
+  [[noreturn]] void fail(const std::string& reason, int column = 0) const;
+  int line_number() const { return unit().text.last().line; }
+  Unit& unit() { return *units_[unit_]; }
+  const Unit& unit() const { return *units_[unit_]; }
+
+  // flow: interpreter_flow.cpp
+  void steer(int i, Cursor at);
+  void go_to(const ProgramPlace& place);
+  void count_pass();
+  void call_sub(const std::string& label, Cursor& at);
+  void return_from_sub(Cursor& at, bool with_value);
+  void call_program(int number, long repeats, bool macro_locals);
+  void call_modal_macro();
+  void return_from_program();
+  void load_arguments(LocalParameters& locals);
+  void jump_to_label(double number, int column);
+  void execute_macro_words();
+  std::size_t find_unit(const std::vector<std::string>& names);
+  void enter_call(Call call, std::size_t unit, const ProgramPlace& place);
+  void leave_call();
+  double condition(Cursor& at);
+
+  // modes: interpreter_modes.cpp
+  void set_modes();
+  void set_path_mode();
+  void set_feed();
+  void set_spindle();
+  void set_tool();
+  void set_tool_length();
+  void set_cutter();
+  void set_offsets();
+  void set_rotation();
+  void set_tilt();
+  void set_modal_stack();
+  void set_by_g10();
+  void set_g92();
+  void enter_frame();
+  MotionFrame frame() const;
+  const ToolEntry& tool(double number, char letter);
+  void need_no_compensation(const char* what, int column) const;
+
+  // motion: interpreter_motion.cpp
+  void emit_motion();
+  void emit_straight(int code);
+  void emit_arc();
+  void emit_probe(int code);
+  void emit_reference_return(int code);
+  void emit_tool_align();
+  void emit_dwell();
+  Coordinates target(bool machine_coordinates = false);
+  void take_tool_vector(Coordinates& end);
+  Arc arc_to(const Coordinates& end);
+  void set_move_feed(Move& move) const;
+  void emit_move(Move move);
+  void emit(Block block);
+  double length(char letter) const { return words_.value(letter) * modal_.length_unit; }
+  double in_si(std::size_t axis, double word) const {
+    return word * (is_rotary(axis) ? kDegree : modal_.length_unit);
+  }
+
+  // canned cycles: interpreter_cycles.cpp
+  void emit_cycle(int code);
+  void cycle_move(const Coordinates& words, Move::Kind kind);
+  void cycle_bottom(int code, Coordinates at, double bottom, double clear, double plane);
+  void cycle_dwell(double seconds);
+  void cycle_spindle(int code);
+
+  // parameters: interpreter_parameters.cpp
+  std::optional<double> read(int number) const override;
+  std::optional<double> read(std::string_view name) const override;
+  bool write(int number, double value) override;
+  double* system_value(int number, double& to_si);
+
+  const Machine machine_;
+  InterpreterOptions options_;
+  bool fanuc_ = false;
+  std::vector<std::unique_ptr<Unit>> units_;
+  std::size_t unit_ = 0;
+  Parameters parameters_;
+  Evaluator evaluator_;
+
+  BlockWords words_;
+  int number_ = 0;                  ///< N
+  std::array<double, 3> vector_{};  ///< A3= B3= C3=
+  unsigned vector_given_ = 0;
+  int siemens_ = 0;  ///< TRAORI: 1, TRAFOOF: 2
+  struct Assignment {
+    int number;  ///< -1: by name
+    std::string name;
+    double value;
+    int column;
+  };
+  std::vector<Assignment> assignments_;
+  std::string_view line_;
+
+  GcodeModal modal_;
+  std::optional<GcodeModal> saved_;  ///< M70 outside every call
+  WorkCoordinates work_;
+  ToolTable tools_;
+  int selected_tool_ = 0, tool_in_spindle_ = 0, h_ = 0, d_ = 0;
+  Coordinates home_, second_home_;  ///< G28, G30 [m, rad]
+  Coordinates probed_ = Coordinates::Zero();
+  double probe_success_ = 0, input_ = 0;
+  std::optional<double> returned_;
+  bool tilted_ = false;
+  CutterCompensation compensation_;
+  CycleWords cycle_;
+  std::vector<Call> calls_;
+  std::vector<Counter> counters_;
+  LocalParameters modal_macro_locals_;
+  int modal_macro_ = 0;  ///< G66: program number
+  std::map<long, ProgramPlace> labels_;
+
+  MotionFrame frame_;
+  FrameMap map_;
+  Coordinates position_;  ///< in frame_
+  std::vector<Block> ready_;
+  std::size_t ready_at_ = 0;
+  long passes_ = 0;
+  bool ended_ = false;
+};
+
+}  // namespace vcnc

@@ -1,0 +1,406 @@
+// What the words do, against values computed by hand.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include "controller/gcode/arc_geometry.hpp"
+#include "controller/gcode/interpreter.hpp"
+#include "controller/program_error.hpp"
+#include "tests/controller/program_file.hpp"
+
+namespace vcnc {
+namespace {
+
+InterpreterOptions bare() {
+  InterpreterOptions options;
+  ToolTable tools;
+  tools.entry(1) = {Vec3(0, 0, 0.05), 0.010};
+  tools.entry(2) = {Vec3(0.001, -0.002, 0.1), 0.004};
+  options.tools = tools;
+  options.bare = true;
+  return options;
+}
+
+std::vector<Block> blocks_of(const std::string& text, InterpreterOptions options = bare(),
+                             const Machine& machine = Machine()) {
+  const ProgramFile file(text + "\nM30\n");
+  GcodeInterpreter program(file.path(), machine, std::move(options));
+  std::vector<Block> blocks;
+  for (Block block = program.next(); !std::holds_alternative<ProgramEnd>(block);
+       block = program.next())
+    blocks.push_back(std::move(block));
+  return blocks;
+}
+
+std::vector<Move> moves_of(const std::string& text, InterpreterOptions options = bare(),
+                           const Machine& machine = Machine()) {
+  std::vector<Move> moves;
+  for (const Block& block : blocks_of(text, std::move(options), machine))
+    if (const Move* move = std::get_if<Move>(&block)) moves.push_back(*move);
+  return moves;
+}
+
+/// End points [mm] of X, Y, Z of all moves, as text: "r 1 2 3; l 4 5 6; a 7 8 9".
+std::string path_of(const std::string& text, InterpreterOptions options = bare()) {
+  std::string path;
+  for (const Move& move : moves_of(text, std::move(options))) {
+    path += path.empty() ? "" : "; ";
+    path += move.probe                       ? "p"
+            : move.kind == Move::Kind::rapid ? "r"
+            : move.kind == Move::Kind::arc   ? "a"
+                                             : "l";
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      char number[32];
+      const double mm = std::round(move.end[i] * 1e7) / 1e4;
+      std::snprintf(number, sizeof number, " %g", mm == 0 ? 0.0 : mm);
+      path += number;
+    }
+  }
+  return path;
+}
+
+std::string refused(const std::string& text, InterpreterOptions options = bare()) {
+  try {
+    blocks_of(text, std::move(options));
+  } catch (const ProgramError& error) {
+    const std::string what = error.what();
+    return what.substr(what.find(':') + 1);
+  }
+  return "accepted";
+}
+
+// ------------------------------------------------------------------------------------- offsets
+
+TEST(GcodeOffsets, WorkOffsetsRotationAndShiftsAddUp) {
+  EXPECT_EQ(path_of("G10 L2 P1 X10 Y20\nG0 X1 Y1"), "r 11 21 0");
+  EXPECT_EQ(path_of("G10 L2 P7 X5\nG59.1 G0 X1"), "r 6 0 0");
+  EXPECT_EQ(path_of("G0 X3\nG92 X0\nX1\nG92.2\nX1\nG92.3\nX2\nG92.1\nX7"),
+            "r 3 0 0; r 4 0 0; r 1 0 0; r 5 0 0; r 7 0 0");
+  EXPECT_EQ(path_of("G52 X10\nG0 X1\nG52 X0\nX1"), "r 11 0 0; r 1 0 0");
+  EXPECT_EQ(path_of("G10 L2 P1 X10 R90\nG0 X1 Y0"), "r 10 1 0");
+  EXPECT_EQ(path_of("G10 L2 P1 R90\nG91 G1 X1 F9\nX1"), "l 0 1 0; l 0 2 0");
+  EXPECT_EQ(path_of("G68 X10 Y0 R90\nG0 X11 Y0\nG69 X1"), "r 10 1 0; r 1 1 0");
+  EXPECT_EQ(path_of("G0 X7 Y8\nG10 L20 P1 X1 Y0\nG0 X0 Y0"), "r 7 8 0; r 6 8 0");
+  EXPECT_EQ(path_of("G20 G10 L2 P1 X1\nG21 G0 X0"), "r 25.4 0 0");
+}
+
+TEST(GcodeOffsets, ToolOffsets) {
+  EXPECT_EQ(path_of("G43 H1 G0 Z1"), "r 0 0 51");
+  EXPECT_EQ(path_of("T2 M6\nG43 G0 X0 Y0 Z1"), "r 1 -2 101");
+  EXPECT_EQ(path_of("G43.1 Z7\nG0 Z1"), "r 0 0 8");
+  EXPECT_EQ(path_of("G43 H1\nG43.2 H2\nG0 Z0"), "r 0 0 150");
+  EXPECT_EQ(path_of("G10 L1 P1 Z30\nG43 H1 G0 Z1"), "r 0 0 31");
+  EXPECT_EQ(refused("G43 H9"), "1:5: unknown H9; allowed are 0 1 2");
+}
+
+TEST(GcodeOffsets, ReferencePointsAndProbing) {
+  EXPECT_EQ(path_of("G0 X5\nG28.1\nX1 Y1\nG28"), "r 5 0 0; r 1 1 0; r 5 0 0");
+  EXPECT_EQ(path_of("G30 X9 Y9"), "r 9 9 0; r 0 0 0");
+  EXPECT_EQ(path_of("G38.2 Z-4 F50\nG0 X[#5063] Y#5070"), "p 0 0 -4; r -4 1 -4");
+  EXPECT_EQ(refused("G38.2 F10"), "1: G38.2 without axis words");
+}
+
+TEST(GcodeOffsets, ParametersShowTheState) {
+  EXPECT_EQ(path_of("G10 L2 P3 Y4\nG56\nG0 X#5220 Y[#5262+1]"), "r 3 9 0");
+  EXPECT_EQ(path_of("G0 X2 Y3\nG0 Z[#5420+#5421]"), "r 2 3 0; r 2 3 5");
+  EXPECT_EQ(path_of("#5221=8\nG0 X1\nG54 X1"), "r 1 0 0; r 9 0 0");
+  EXPECT_EQ(path_of("T2 M6\nG0 X#5400 Y#5410"), "r 2 4 0");
+}
+
+// --------------------------------------------------------------------------------------- feeds
+
+TEST(GcodeFeeds, PerTurnAndInverseTime) {
+  const auto per_turn = moves_of("S600 M3\nG95 F0.2\nG1 X10");
+  ASSERT_EQ(per_turn.size(), 1u);
+  EXPECT_NEAR(per_turn[0].feed, 0.2e-3 * 10, 1e-15);
+  EXPECT_NEAR(per_turn[0].feed_per_turn, 0.2e-3, 1e-18);
+  EXPECT_NE(refused("G95 F1\nG1 X1").find("feed per turn (G95) without S"), std::string::npos);
+  EXPECT_NEAR(moves_of("G93 G1 X10 F4")[0].feed, 15, 1e-12);
+}
+
+TEST(GcodeArcs, TurnsAndAbsoluteCentres) {
+  EXPECT_NEAR(moves_of("G3 I5 P3 F9")[0].arc.sweep, 6 * kPi, 1e-12);
+  EXPECT_NEAR(moves_of("G2 X10 I5 P2 F9")[0].arc.sweep, -3 * kPi, 1e-12);
+  const Move absolute = moves_of("G90.1 G10 L2 P1 X1\nG0 X0 Y0\nG3 X10 I5 J0 F9")[1];
+  EXPECT_NEAR(absolute.arc.centre[0], 6e-3, 1e-15);
+  EXPECT_NE(refused("G90.1 G3 X10 I5 F9").find("needs I and J"), std::string::npos);
+  EXPECT_NE(refused("G3 I5 P0 F9").find("turns of an arc"), std::string::npos);
+}
+
+// ----------------------------------------------------------------------- cutter compensation
+
+TEST(GcodeCompensation, SquareFromOutsideAndInside) {
+  // Tool of 10 mm; a square of 40 mm clockwise with the tool on its left: outside.
+  const auto moves = moves_of("G0 Y-40\nF100\nG41 D1 G1 X0 Y-20\nY40\nX40\nY0\nX-20\nG40 Y-30");
+  // entry, side, corner, side, corner, side, corner, side, exit
+  ASSERT_EQ(moves.size(), 10u);
+  const auto at = [&](std::size_t i) { return Vec2(moves[i].end[0] * 1e3, moves[i].end[1] * 1e3); };
+  EXPECT_LE((at(1) - Vec2(-5, -20)).norm(), 1e-9);
+  EXPECT_LE((at(2) - Vec2(-5, 40)).norm(), 1e-9);
+  EXPECT_EQ(moves[3].kind, Move::Kind::arc);
+  EXPECT_NEAR(moves[3].arc.sweep, -kPi / 2, 1e-12);
+  EXPECT_LE((at(3) - Vec2(0, 45)).norm(), 1e-9);
+  EXPECT_LE((at(4) - Vec2(40, 45)).norm(), 1e-9);
+  EXPECT_LE((at(5) - Vec2(45, 40)).norm(), 1e-9);
+  EXPECT_LE((at(8) - Vec2(-20, -5)).norm(), 1e-9);
+  EXPECT_LE((at(9) - Vec2(-20, -30)).norm(), 1e-9);
+  // The same square with the tool on the right: inside, cut corners.
+  EXPECT_EQ(path_of("F100\nG42 D1 G1 X0 Y10\nY40\nX40\nY0\nX10\nG40 X20 Y20"),
+            "l 5 10 0; l 5 35 0; l 35 35 0; l 35 5 0; l 10 5 0; l 20 20 0");
+}
+
+TEST(GcodeCompensation, ArcsKeepCentreAndAngle) {
+  // Round a circle of 30 mm, tangent entry: outside 35, inside 25.
+  const auto outside = moves_of("F100\nG0 X30 Y-20\nG42 D1 G1 X30 Y0\nG3 I-30\nG40 G1 X30 Y20");
+  ASSERT_EQ(outside.size(), 4u);
+  EXPECT_NEAR(outside[2].end[0], 0.035, 1e-12);
+  EXPECT_NEAR(outside[2].arc.sweep, 2 * kPi, 1e-12);
+  const auto inside = moves_of("F100\nG0 X30 Y-20\nG41 D1 G1 X30 Y0\nG3 I-30\nG40 G1 X20 Y0");
+  ASSERT_EQ(inside.size(), 4u);
+  EXPECT_NEAR(inside[2].end[0], 0.025, 1e-12);
+}
+
+TEST(GcodeCompensation, InsideCornerOfLineAndArcIsWhereBothMeet) {
+  // Along y = 0 to the right into a half circle about (20, 0) of 10 mm that goes up and back:
+  // the shifted line y = 5 meets the circle of 5 mm about (20, 0) at its top... from the left.
+  const auto moves =
+      moves_of("F100\nG0 X-20 Y0\nG41.1 D4 G1 X0 Y0\nX30 Y0\nG3 X10 I-10\nG40 G1 X10 Y-30");
+  ASSERT_EQ(moves.size(), 5u);
+  const double x = 20 + std::sqrt(8.0 * 8.0 - 2.0 * 2.0);
+  EXPECT_NEAR(moves[2].end[0] * 1e3, x, 1e-9);
+  EXPECT_NEAR(moves[2].end[1] * 1e3, 2, 1e-9);
+  EXPECT_NEAR((moves[3].start.head<2>() - moves[2].end.head<2>()).norm(), 0, 1e-15);
+}
+
+TEST(GcodeCompensation, WhatWouldGougeIsRefused) {
+  EXPECT_NE(refused("F100\nG41 D1 G1 X3\nX9").find("must be longer than the tool's radius"),
+            std::string::npos);
+  EXPECT_NE(refused("F100\nG0 Y-9\nG41 D1 G1 Y0\nG3 X-4 I-2\nX5").find("gouge: the arc's radius"),
+            std::string::npos);
+  EXPECT_NE(refused("F100\nG42 D1 G1 Y20\nX4\nY0").find("too short for the inside corner"),
+            std::string::npos);
+  EXPECT_NE(refused("F9\nG41 D1\nG41 D1").find("G41 while cutter compensation is on"),
+            std::string::npos);
+  EXPECT_NE(refused("F9\nG41 D1 G1 X20\nG18").find("change of the plane while"), std::string::npos);
+}
+
+/// The centre never comes closer to a convex polygon than the radius, and stays at it.
+TEST(GcodeCompensation, RandomConvexPolygonsAreFollowedAtTheRadius) {
+  std::mt19937_64 random(7);
+  const auto uniform = [&] { return double(random() >> 11) * 0x1p-53; };
+  for (int round = 0; round < 50; ++round) {
+    std::vector<Vec2> corners;
+    for (double angle = 0.3 * uniform(); angle < 5.9; angle += 0.3 + uniform())
+      corners.emplace_back(40 * std::cos(-angle), 40 * std::sin(-angle));  // clockwise
+    std::string text = "F500\nG0 X100 Y100\nG41 D1 G1 X70 Y60\n";
+    for (std::size_t i = 0; i <= corners.size(); ++i) {
+      const Vec2& c = corners[i % corners.size()];
+      text.append("X").append(std::to_string(c[0])).append(" Y").append(std::to_string(c[1]));
+      text += '\n';
+    }
+    const auto moves = moves_of(text + "G40 X100 Y-100");
+    const auto distance = [&](const Vec2& p) {
+      double least = 1e9;
+      for (std::size_t i = 0; i < corners.size(); ++i) {
+        const Vec2 a = corners[i], d = corners[(i + 1) % corners.size()] - a;
+        const double t = std::clamp((p - a).dot(d) / d.squaredNorm(), 0.0, 1.0);
+        least = std::min(least, (a + t * d - p).norm());
+      }
+      return least;
+    };
+    int checked = 0;
+    for (std::size_t i = 4; i + 2 < moves.size(); ++i) {
+      const Vec2 p = moves[i].end.head<2>() * 1e3;
+      EXPECT_NEAR(distance(p), 5, 2e-5);
+      ++checked;
+      if (moves[i].kind == Move::Kind::line) {
+        EXPECT_NEAR(distance(0.5e3 * (moves[i].start + moves[i].end).head<2>()), 5, 2e-5);
+      }
+    }
+    EXPECT_GT(checked, 3);
+  }
+}
+
+// -------------------------------------------------------------------------------------- cycles
+
+TEST(GcodeCycles, DrillingAndRetract) {
+  EXPECT_EQ(
+      path_of("F9 G0 Z10\nG98 G81 X1 Y2 Z-3 R1\nX5\nG80"),
+      "r 0 0 10; r 1 2 10; r 1 2 1; l 1 2 -3; r 1 2 10; r 5 2 10; r 5 2 1; l 5 2 -3; r 5 2 10");
+  EXPECT_EQ(path_of("F9 G0 Z10\nG99 G81 X1 Z-3 R1\nG80 G0 X0"),
+            "r 0 0 10; r 1 0 10; r 1 0 1; l 1 0 -3; r 1 0 1; r 0 0 1");
+  EXPECT_EQ(path_of("F9 G0 Z10\nG91 G99 G81 X1 Z-3 R-8 L2"),
+            "r 0 0 10; r 1 0 10; r 1 0 2; l 1 0 -1; r 1 0 2; r 2 0 2; l 2 0 -1; r 2 0 2");
+}
+
+TEST(GcodeCycles, PecksAndChipBreaks) {
+  EXPECT_EQ(path_of("F9 G0 Z2\nG99 G83 X0 Z-5 R0 Q3"),
+            "r 0 0 2; r 0 0 0; l 0 0 -3; r 0 0 0; r 0 0 -2.746; l 0 0 -5; r 0 0 0");
+  EXPECT_EQ(path_of("F9 G0 Z2\nG99 G73 X0 Z-5 R0 Q3"),
+            "r 0 0 2; r 0 0 0; l 0 0 -3; r 0 0 -2.746; l 0 0 -5; r 0 0 0");
+}
+
+TEST(GcodeCycles, BoringAndTapping) {
+  EXPECT_EQ(path_of("F9 G0 Z2\nG98 G85 X0 Z-5 R0"), "r 0 0 2; r 0 0 0; l 0 0 -5; l 0 0 0; r 0 0 2");
+  int spindle = 0, dwell = 0;
+  for (const Block& block : blocks_of("F9 S9 M3\nG99 G84 X1 Z-5 R0 P0.5")) {
+    spindle += std::holds_alternative<SpindleWord>(block);
+    dwell += std::holds_alternative<Dwell>(block);
+  }
+  EXPECT_EQ(spindle, 5);  // M3; off, reversed, off, on
+  EXPECT_EQ(dwell, 1);
+  EXPECT_EQ(path_of("F9 S9 M3 G0 Z2\nG99 G76 X0 Z-5 R0 Q1 P0.1"),
+            "r 0 0 2; r 0 0 0; l 0 0 -5; r 1 0 -5; r 1 0 0; r 0 0 0");
+  EXPECT_NE(refused("F9\nG84 X1 Z-5 R0").find("spindle at rest"), std::string::npos);
+  EXPECT_NE(refused("F9\nG81 X1 Z5 R0").find("is below Z"), std::string::npos);
+  EXPECT_NE(refused("F9\nG83 X1 Z-5 R0").find("needs Q greater than 0"), std::string::npos);
+}
+
+// ---------------------------------------------------------------------------------------- flow
+
+TEST(GcodeFlow, SubroutinesWithArgumentsAndValues) {
+  EXPECT_EQ(
+      path_of(
+          "O100 sub\nG0 X[#1+#2]\nO100 endsub [#1*2]\n#1=7\nO100 call [1] [2]\nG0 Y#1 Z#<_value>"),
+      "r 3 0 0; r 3 7 2");
+  EXPECT_EQ(path_of("O<fac> sub\nO1 if [#1 le 1]\nO<fac> return [1]\nO1 endif\nO<fac> call [#1-1]\n"
+                    "O<fac> endsub [#1*#<_value>]\nO<fac> call [5]\nG0 X#<_value>"),
+            "r 120 0 0");
+  EXPECT_EQ(path_of("O7 sub\nG0 X1\nO7 endsub\n#3=7\nO[#3] call"), "r 1 0 0");
+}
+
+TEST(GcodeFlow, BranchesAndLoops) {
+  for (const auto& [value, x] : {std::pair{"1", 10}, {"2", 20}, {"3", 30}}) {
+    const std::string text = std::string("#1=") + value +
+                             "\nO1 if [#1 eq 1]\nG0 X10\nO1 elseif [#1 eq 2]\nG0 X20\nO1 else\nG0 "
+                             "X30\nO1 endif";
+    EXPECT_EQ(path_of(text), std::string("r ").append(std::to_string(x)).append(" 0 0"));
+  }
+  EXPECT_EQ(path_of("#1=0\nO1 while [#1 lt 5]\n#1=[#1+1]\nO2 if [#1 eq 2]\nO1 continue\nO2 endif\n"
+                    "O3 if [#1 eq 4]\nO1 break\nO3 endif\nG0 X#1\nO1 endwhile"),
+            "r 1 0 0; r 3 0 0");
+  EXPECT_EQ(path_of("#1=0\nO1 do\n#1=[#1+1]\nG0 X#1\nO1 while [#1 lt 2]"), "r 1 0 0; r 2 0 0");
+  EXPECT_EQ(path_of("O1 repeat [2]\nO2 repeat [2]\nG91 G0 X1\nO2 endrepeat\nO1 endrepeat"),
+            "r 1 0 0; r 2 0 0; r 3 0 0; r 4 0 0");
+}
+
+TEST(GcodeFlow, FanucMacros) {
+  EXPECT_EQ(path_of("#1=1\nWHILE [#1 LE 3] DO1\nG0 X#1\n#1=#1+1\nEND1"),
+            "r 1 0 0; r 2 0 0; r 3 0 0");
+  EXPECT_EQ(path_of("#1=0\nN10 #1=#1+1\nG0 X#1\nIF [#1 LT 2] GOTO 10"), "r 1 0 0; r 2 0 0");
+  EXPECT_EQ(path_of("GOTO 20\nG0 X1\nN20 IF [1 EQ 1] THEN #5=4\nG0 X#5 Y#6"), "r 4 0 0");
+  EXPECT_EQ(path_of("G65 P900 L2 A3 X4\nG0 Z1\nM30\nO900\nG0 X#1 Y#24\nG91 G0 Z1\nG90\nM99"),
+            "r 3 4 0; r 3 4 1; r 3 4 2; r 3 4 1");
+  EXPECT_EQ(path_of("M98 P900 L2\nM30\nO900\nG91 G0 X1\nM99"), "r 1 0 0; r 2 0 0");
+  EXPECT_EQ(path_of("G66 P900 A5\nG0 X1\nX2\nG67\nX3\nM30\nO900\nG0 Z#1\nZ0\nM99"),
+            "r 1 0 0; r 1 0 5; r 1 0 0; r 2 0 0; r 2 0 5; r 2 0 0; r 3 0 0");
+  EXPECT_NE(refused("IF [1 EQ 1] THEN #3000=7 (NO TOOL)").find("raises alarm 7 (NO TOOL)"),
+            std::string::npos);
+  EXPECT_EQ(path_of("M98 P900\nG0 Y1\nN7 G0 Z1\nM30\nO900\nG0 X1\nM99 P7"), "r 1 0 0; r 1 0 1");
+}
+
+TEST(GcodeFlow, SubroutinesInFilesBesideTheProgram) {
+  const std::filesystem::path beside = std::filesystem::temp_directory_path() / "beside.ngc",
+                              numbered = std::filesystem::temp_directory_path() / "8123.nc";
+  std::ofstream(beside) << "O<beside> sub\nG0 X#1\nO<beside> endsub\n";
+  std::ofstream(numbered) << "%\nO8123\nG0 Y2\nM99\n";
+  EXPECT_EQ(path_of("O<beside> call [4]\nM98 P8123"), "r 4 0 0; r 4 2 0");
+  std::filesystem::remove(beside);
+  std::filesystem::remove(numbered);
+  EXPECT_NE(refused("O<beside> call").find("there is no O<beside> sub"), std::string::npos);
+}
+
+TEST(GcodeFlow, WhatDoesNotEndOrFitIsRefused) {
+  EXPECT_EQ(refused("O1 while [1]\nO1 endwhile"),
+            "2: more than 2000000 passes of loops, calls and jumps; does the program end?");
+  EXPECT_NE(refused("O1 sub\nO1 call\nO1 endsub\nO1 call").find("nested deeper than 50"),
+            std::string::npos);
+  EXPECT_NE(refused("O1 if [1]").find("1: O1 IF without its end"), std::string::npos);
+  EXPECT_NE(refused("O1 endwhile").find("O1 ENDWHILE without its begin"), std::string::npos);
+  EXPECT_NE(refused("O1 while [0]\nO2 endwhile").find("while O1 WHILE of line 1 is open"),
+            std::string::npos);
+  EXPECT_NE(refused("O1 break").find("outside a loop"), std::string::npos);
+  EXPECT_NE(refused("GOTO 5").find("there is no block N5"), std::string::npos);
+  EXPECT_NE(refused("M99").find("M99 in the main program"), std::string::npos);
+}
+
+TEST(GcodeFlow, BlockDeleteAndModes) {
+  EXPECT_EQ(path_of("/G0 X1\nG0 Y1"), "r 1 0 0; r 1 1 0");
+  InterpreterOptions options = bare();
+  options.block_delete = true;
+  EXPECT_EQ(path_of("/G0 X1\nG0 Y1", options), "r 0 1 0");
+  EXPECT_EQ(path_of("M70\nG91 G20\nM72\nG0 X1"), "r 1 0 0");
+  EXPECT_EQ(path_of("O1 sub\nM73\nG91\nG0 X1\nO1 endsub\nG0 X1\nO1 call\nG0 X1"),
+            "r 1 0 0; r 2 0 0; r 1 0 0");
+}
+
+// ----------------------------------------------------------------------------------- five axes
+
+TEST(GcodeFiveAxes, ToolVectorGivesTheRotaryAxes) {
+  // A = 20, C = 30: d = (0.171010072, -0.296198133, 0.939692621)
+  const std::string vector = "I0.171010072 J-0.296198133 K0.939692621";
+  for (const std::string& text :
+       {std::string("G43.5 H1\nG1 X1 ").append(vector).append(" F9"),
+        std::string("TRAORI\nG1 X1 A3=0.171010072 B3=-0.296198133 C3=0.939692621 F9")}) {
+    const auto moves = moves_of(text);
+    ASSERT_EQ(moves.size(), 1u);
+    EXPECT_NEAR(moves[0].end[kA] / kDegree, 20, 1e-6);
+    EXPECT_NEAR(moves[0].end[kC] / kDegree, 30, 1e-6);
+    EXPECT_NEAR(moves[0].end[kX], 1e-3, 1e-15);
+  }
+  EXPECT_NE(refused("G43.5 H1\nG1 I0 J0 K0 F9").find("direction of the tool is 0"),
+            std::string::npos);
+  EXPECT_NE(refused("G1 X1 A3=1 F9").find("without TRAORI"), std::string::npos);
+}
+
+TEST(GcodeFiveAxes, TiltedPlane) {
+  Machine machine;
+  machine.kinematics.p_MA = Vec3(0, 0, -0.05);
+  machine.kinematics.p_MC = Vec3(0, 0.01, -0.05);
+  // A plane turned about x by 20 and before that about z by 30 degrees.
+  const auto moves =
+      moves_of("G43 H1\nG68.2 X10 Y20 Z30 I30 J20 K0\nG53.1\nG1 X1 Y2 Z3 F9\nG3 I5\nG69\nG0 X0",
+               bare(), machine);
+  ASSERT_EQ(moves.size(), 4u);
+  EXPECT_NEAR(moves[0].end[kA] / kDegree, 20, 1e-9);
+  EXPECT_NEAR(moves[0].end[kC] / kDegree, 30, 1e-9);
+  EXPECT_EQ(moves[0].end.head<3>(), moves[0].start.head<3>());
+  // p_W = o + Rz(30) Rx(20) p, through the kinematics of the machine.
+  const Vec3 p = Vec3(0.01, 0.02, 0.03) +
+                 (Eigen::AngleAxisd(30 * kDegree, Vec3::UnitZ()) *
+                  Eigen::AngleAxisd(20 * kDegree, Vec3::UnitX()) * Vec3(1e-3, 2e-3, 3e-3));
+  const AxisVector q =
+      Kinematics(machine.kinematics, 0.05, Vec3::Zero()).inverse(p, 20 * kDegree, 30 * kDegree);
+  const Coordinates axes = FrameMap(machine.kinematics, moves[1].frame).to_axes(moves[1].end);
+  for (Eigen::Index i = 0; i < 5; ++i)
+    EXPECT_NEAR(axes[i], q[static_cast<std::size_t>(i)], 1e-12) << i;
+  EXPECT_EQ(moves[2].kind, Move::Kind::arc);
+  EXPECT_FALSE(moves[3].frame.rtcp);
+  EXPECT_NE(refused("G53.1").find("G53.1 without G68.2"), std::string::npos);
+}
+
+TEST(GcodeFiveAxes, SiemensWords) {
+  EXPECT_EQ(path_of("G0 X=10 Y=2*3"), "r 10 6 0");
+  EXPECT_EQ(path_of("G3 X10 CR=5 F9"), "a 10 0 0");
+  const auto moves = moves_of("TRAORI\nG0 X1\nTRAFOOF\nG0 X1");
+  EXPECT_TRUE(moves[0].frame.rtcp);
+}
+
+// -------------------------------------------------------------------------------- tool tables
+
+TEST(GcodeTools, TableOfLinuxCnc) {
+  const ProgramFile file("T1 P1 Z10.5 D6 ; end mill\n; nothing\nT12 P2 X1 Z-2\n");
+  const ToolTable table = ToolTable::read(file.path(), 25.4e-3);
+  EXPECT_NEAR(table.find(1)->offset.z(), 0.2667, 1e-12);
+  EXPECT_NEAR(table.find(1)->diameter, 0.1524, 1e-12);
+  EXPECT_NEAR(table.find(12)->offset.x(), 0.0254, 1e-12);
+  EXPECT_EQ(table.find(2), nullptr);
+  const ProgramFile wrong("T1 Z1\nT1 Z2\n");
+  EXPECT_THROW(ToolTable::read(wrong.path(), 1e-3), ProgramError);
+}
+
+}  // namespace
+}  // namespace vcnc

@@ -1,0 +1,11 @@
+(the same cycle)
+F200.
+G0 Z10.
+G99 G81 X10. Y5. Z-5. R2.
+X20.
+X30.
+G80
+G98 G81 X40. Y5. Z-5. R2.
+G80
+G0 X0.
+M30

@@ -1,0 +1,9 @@
+(G52 moves the system of work)
+F500
+G10 L2 P1 X10
+G1 X5 Y5
+G52 X20 Y5
+G1 X5 Y5
+G52 X0 Y0
+G1 X5 Y5
+M30

@@ -1,0 +1,16 @@
+(EQ NE GT GE LT LE)
+F500
+#1=2
+IF[#1 EQ 2] THEN #2=1
+G1 X#2
+IF[#1 NE 3] THEN #2=2
+X#2
+IF[#1 GT 1] THEN #2=3
+X#2
+IF[#1 GE 2] THEN #2=4
+X#2
+IF[#1 LT 3] THEN #2=5
+X#2
+IF[#1 LE 2] THEN #2=6
+X#2
+M30

@@ -1,0 +1,10 @@
+(D word from the table)
+F500
+G0 X-20 Y-20
+G41 D1 G1 X0 Y-10
+Y30
+X30
+Y0
+X-10
+G40 G1 X-20 Y-20
+M30

@@ -1,0 +1,11 @@
+(M98 with repetitions)
+F500
+G1 X0 Y0
+M98 P100 L3
+G1 X0
+M30
+O100
+G91 G1 X10
+Y5
+G90
+M99

@@ -1,0 +1,5 @@
+(refused: 3:12 DO)
+G1 X0 F500
+WHILE[0] DO4
+END4
+M30

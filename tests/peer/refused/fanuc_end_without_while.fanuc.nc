@@ -1,0 +1,4 @@
+(refused: 3 END|DO|WHILE)
+G1 X0 F500
+END1
+M30

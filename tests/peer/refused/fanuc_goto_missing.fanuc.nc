@@ -1,0 +1,4 @@
+(refused: 3:1 99)
+G1 X0 F500
+GOTO 99
+M30

@@ -1,0 +1,4 @@
+(refused: 3:1 12|WRONG TOOL|alarm)
+G1 X0 F500
+#3000=12 (WRONG TOOL)
+M30
