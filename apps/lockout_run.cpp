@@ -71,12 +71,12 @@ bool spindle_stays_locked(Node& spindle, Tick from) {
   command.controlword = cia402::kEnable;
   command.spindle_mode = GroupCommand::SpindleMode::clockwise;
   command.spindle_speed = 100;
-  const std::vector<Frame> inputs{encode(OvertravelState{}), encode(command)};
   Frames out;
   double before = 0;
   for (Tick k = from; k < from + 10; ++k) {
     out.clear();
-    spindle.step(k, inputs, out);
+    command.tick = low16(k - 1);
+    spindle.step(k, Frames{encode(OvertravelState{}), encode(command)}, out);
     const auto status = decode_drive_status(out.at(0));
     if (!status) return false;
     const double speed = std::abs(status->second_encoder);

@@ -103,12 +103,12 @@ bool DriveNode::accepts(std::uint16_t cob_id) const {
   return cob_id == kCommandId || cob_id == kStatusBase + kOvertravelNode;
 }
 
-void DriveNode::read(std::span<const Frame> inputs, Frames& out) {
+void DriveNode::read(Tick k, std::span<const Frame> inputs, Frames& out) {
   ++cycles_without_command_;
   ++cycles_without_overtravel_;
   for (const Frame& frame : inputs) {
     if (const auto command = decode_group_command(frame)) {
-      if (!plausible(*command)) continue;
+      if (!plausible(*command) || !is_fresh(*command, k)) continue;
       command_ = *command;
       commanded_ = true;
       cycles_without_command_ = 0;
@@ -218,7 +218,7 @@ AxisCycle DriveNode::move() {
 void DriveNode::step(Tick k, std::span<const Frame> inputs, Frames& out) {
   const std::size_t first = out.size();
   out.emplace_back();  // the cyclic frame comes first; filled in below
-  read(inputs, out);
+  read(k, inputs, out);
   if (failing_) fail(out);
   drive_.shift_encoder(encoder_jump_);
   failing_ = false;

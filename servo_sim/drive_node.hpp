@@ -33,6 +33,11 @@ namespace vcnc {
 /// What a drive watches besides its set-points: cycles without a message that must come each cycle.
 inline constexpr int kSilentCyclesAllowed = 2;
 
+/// A command heard in cycle k was sent in the one before; an older one is borne as long as none is.
+inline bool is_fresh(const GroupCommand& command, Tick k) {
+  return static_cast<std::uint16_t>(low16(k - 1) - command.tick) <= kSilentCyclesAllowed;
+}
+
 /// Error codes of a drive (CiA 301, CiA 402). 8130h: detail is the node not heard.
 inline constexpr std::uint16_t kCommandLostError = 0x8250, kGuardLostError = 0x8130,
                                kFollowingErrorCode = 0x8611, kLimitSwitchError = 0x8612,
@@ -66,7 +71,7 @@ class DriveNode : public Node {
   void tell_reset(Frames& out);
   bool lags(const AxisCycle& cycle);
   void fail(Frames& out);
-  void read(std::span<const Frame> inputs, Frames& out);
+  void read(Tick k, std::span<const Frame> inputs, Frames& out);
   void watch(const AxisCycle& cycle, Frames& out);
   AxisCycle move();
 

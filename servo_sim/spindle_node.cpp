@@ -107,7 +107,7 @@ void SpindleNode::step(Tick k, std::span<const Frame> inputs, Frames& out) {
   bool pressed = false;
   for (const Frame& frame : inputs) {
     if (const auto command = decode_group_command(frame)) {
-      if (!is_finite(*command)) continue;
+      if (!is_finite(*command) || !is_fresh(*command, k)) continue;
       command_ = *command;
       commanded_ = true;
       cycles_without_command_ = 0;

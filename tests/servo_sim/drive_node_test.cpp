@@ -21,6 +21,7 @@ class DriveNodeTest : public testing::Test {
     inputs.push_back(encode(guard));
     if (command) {
       GroupCommand c;
+      c.tick = low16(k_ - 1);
       c.controlword = controlword;
       c.axes[kX].position = position;
       inputs.push_back(encode(c));
@@ -92,20 +93,38 @@ TEST_F(DriveNodeTest, StopsWhenTheOvertravelModuleFallsSilent) {
   Frames out;
   GroupCommand c;
   c.controlword = cia402::kEnable;
-  const Frames only_command{encode(c)};
   for (int i = 0; i <= kSilentCyclesAllowed; ++i) {
     out.clear();
-    node_.step(k_++, only_command, out);
+    c.tick = low16(k_ - 1);
+    node_.step(k_++, Frames{encode(c)}, out);
   }
   EXPECT_EQ(cia402::state_of(decode_drive_status(out.at(0))->statusword),
             cia402::State::quick_stop);
   EXPECT_EQ(decode_emergency(out.at(1))->code, 0x8130);
 }
 
+TEST_F(DriveNodeTest, CommandsThatComeTooLateAreNone) {
+  enable();
+  const auto late = [&](Tick cycles) {
+    Frames out;
+    GroupCommand c;
+    c.controlword = cia402::kEnable;
+    c.tick = low16(k_ - 1 - cycles);
+    node_.step(k_++, Frames{encode(OvertravelState{}), encode(c)}, out);
+    return cia402::state_of(decode_drive_status(out.at(0))->statusword);
+  };
+  for (int i = 0; i < 20; ++i)
+    EXPECT_EQ(late(kSilentCyclesAllowed), cia402::State::operation_enabled);
+  for (int i = 0; i < kSilentCyclesAllowed; ++i)
+    EXPECT_EQ(late(kSilentCyclesAllowed + 1), cia402::State::operation_enabled);
+  EXPECT_EQ(late(kSilentCyclesAllowed + 1), cia402::State::quick_stop);
+}
+
 TEST_F(DriveNodeTest, ASoftStopIsTheNcUnitsBusiness) {
   enable();
   Frames inputs{encode(OvertravelState{.state = OvertravelState::State::soft_stop})}, out;
   GroupCommand c;
+  c.tick = low16(k_ - 1);
   c.controlword = cia402::kEnable;
   inputs.push_back(encode(c));
   node_.step(k_++, inputs, out);
@@ -127,6 +146,7 @@ TEST_F(DriveNodeTest, AFollowingErrorBeyondTheWindowIsAFaultUntilReset) {
   const auto status = [&](std::uint16_t controlword, double position) {
     Frames out;
     GroupCommand c;
+    c.tick = low16(k_ - 1);
     c.controlword = controlword;
     c.axes[kX].position = position;
     node_.step(k_++, Frames{encode(OvertravelState{}), encode(c)}, out);
@@ -154,6 +174,7 @@ TEST_F(DriveNodeTest, TheLimitSwitchStopsAndLetsBack) {
   const auto step = [&](std::uint16_t controlword, double position, double velocity = 0) {
     Frames out;
     GroupCommand c;
+    c.tick = low16(k - 1);
     c.controlword = controlword;
     c.axes[kX] = {position, velocity};
     node.step(k++, Frames{encode(OvertravelState{}), encode(c)}, out);

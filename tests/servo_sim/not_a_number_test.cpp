@@ -28,8 +28,9 @@ TEST(NotANumber, SetPointLeadsToAQuickStopAsIfNoCommandHadCome) {
     DriveNode node(kX, machine, 1, *truth);
     Frames out;
     Tick k = 0;
-    const auto cycle = [&](const GroupCommand& command) {
+    const auto cycle = [&](GroupCommand command) {
       out.clear();
+      command.tick = low16(k - 1);
       node.step(k++, Frames{encode(command)}, out);
       return decode_drive_status(out.at(0)).value();
     };
@@ -52,8 +53,9 @@ TEST(NotANumber, SpindleSpeedMeansOff) {
   SpindleNode node(machine);
   Frames out;
   Tick k = 0;
-  const auto cycle = [&](const GroupCommand& command) {
+  const auto cycle = [&](GroupCommand command) {
     out.clear();
+    command.tick = low16(k - 1);
     node.step(k++, Frames{encode(command)}, out);
     return decode_drive_status(out.at(0)).value();
   };

@@ -10,6 +10,7 @@ class SpindleNodeTest : public testing::Test {
   DriveStatus cycle(GroupCommand::SpindleMode mode, bool tripped = false, std::uint8_t flags = 0,
                     std::uint16_t cw = cia402::kEnable) {
     GroupCommand c;
+    c.tick = low16(k_ - 1);
     c.controlword = cw;
     c.spindle_mode = mode;
     c.spindle_speed = 100;
@@ -83,6 +84,7 @@ TEST(SpindleLock, IsKeptWhenItClosesAndHoldsAfterSwitchingOn) {
   OneState memory;
   const auto step = [](SpindleNode& node, Tick k, std::uint8_t flags, std::uint16_t controlword) {
     GroupCommand command;
+    command.tick = low16(k - 1);
     command.controlword = controlword;
     command.spindle_mode = GroupCommand::SpindleMode::clockwise;
     command.spindle_speed = 100;
