@@ -52,7 +52,7 @@ void DriveNode::declare(ObjectDictionary& objects) {
   objects.add({0x6041, 0, "Statusword", u16, read_only, "", [this] { return statusword_; }});
   objects.add({0x605a, 0, "Quick stop option code", i16, read_write, "",
                [this] { return quick_stop_option_; },
-               [this, ok](std::int64_t v) {
+               [this](std::int64_t v) {
                  if (v != kLeaveQuickStop && v != kStayInQuickStop) return SdoAbort::value;
                  if (state_ == cia402::State::quick_stop) return SdoAbort::device_state;
                  quick_stop_option_ = v;
@@ -60,7 +60,7 @@ void DriveNode::declare(ObjectDictionary& objects) {
                }, kLeaveQuickStop, kStayInQuickStop});
   objects.add({0x605e, 0, "Fault reaction option code", i16, constant, "", fixed(2)});
   objects.add({0x6060, 0, "Modes of operation", i8, read_write, "", fixed(8),
-               [ok](std::int64_t v) { return v == 8 ? ok : SdoAbort::value; }});
+               [](std::int64_t v) { return v == 8 ? ok : SdoAbort::value; }});
   objects.add({0x6061, 0, "Modes of operation display", i8, read_only, "", fixed(8)});
   objects.add({0x6062, 0, "Position demand value", i32, read_only, length,
                [this, position] { return position(drive_.position()); }});
@@ -68,11 +68,11 @@ void DriveNode::declare(ObjectDictionary& objects) {
                [this, position] { return position(position_); }});
   objects.add({0x6065, 0, "Following error window", u32, read_write, length,
                [this, position] { return position(following_window_); },
-               [this, ok](std::int64_t v) { following_window_ = static_cast<double>(v) / kPositionCounts; return ok; },
+               [this](std::int64_t v) { following_window_ = static_cast<double>(v) / kPositionCounts; return ok; },
                1, kMost});
   objects.add({0x6066, 0, "Following error time out", u16, read_write, "ms",
                [this] { return following_timeout_; },
-               [this, ok](std::int64_t v) { following_timeout_ = v; return ok; }});
+               [this](std::int64_t v) { following_timeout_ = v; return ok; }});
   objects.add({0x606c, 0, "Velocity actual value", i32, read_only, speed,
                [this] { return counts(velocity_, kSpeedCounts); }});
   objects.add({0x6077, 0, "Torque actual value", i16, read_only, "0.001 of the limit",
@@ -86,7 +86,7 @@ void DriveNode::declare(ObjectDictionary& objects) {
                fixed(counts(largest_velocity_ / kImplausible, kSpeedCounts))});
   objects.add({0x6085, 0, "Quick stop deceleration", u32, read_write, acceleration,
                [this] { return counts(quick_stop_deceleration_, kSpeedCounts); },
-               [this, ok](std::int64_t v) { quick_stop_deceleration_ = static_cast<double>(v) / kSpeedCounts; return ok; },
+               [this](std::int64_t v) { quick_stop_deceleration_ = static_cast<double>(v) / kSpeedCounts; return ok; },
                1000, kMost});
   objects.record(0x60c2, "Interpolation time period");
   objects.add({0x60c2, 1, "Interpolation time period value", u8, constant, "", fixed(1)});
