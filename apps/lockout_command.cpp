@@ -116,6 +116,8 @@ int lockout_command(LockoutArguments a) {
   if (a.machines.empty()) a.machines = shipped_machines();
   if (a.only.starts_with("process-") && a.processes == 0)
     throw InputError("--only " + a.only + ": needs --processes");
+  if (a.only.starts_with("process-") && !a.out.empty())
+    throw InputError("--out: only a run in this process leaves a folder, not " + a.only);
   LockoutResults results{.seed = a.seed};
   if (!a.only.starts_with("process-")) results.items = lockout_items(a);
   if (results.items.empty() && a.processes == 0)

@@ -127,6 +127,7 @@ class ProcessRun {
       inputs.write_inputs(the_case.machine, the_case.piece ? &*the_case.piece : nullptr);
     }
     std::ofstream(folder / "in/program.ngc") << the_case.program;
+    hash_ = hash_of_files(folder);
     fs::create_directory(folder / "tmp");
     const std::string out = (folder / "out").string();
     const Pacer clock;
@@ -165,9 +166,7 @@ class ProcessRun {
     if (alone.end.refused) {  // the next one then; the feed is at the edge
       counter_ += 100;
       s = draw_.ordinary(number_);
-      hash_ = run_lockout("reference", s, {.work_folder = folder.string()}, log).trace_hash;
-    } else {
-      hash_ = alone.trace_hash;
+      run_lockout("reference", s, {.work_folder = folder.string()}, log);
     }
     BusFault& f = planned_.fault;
     const double which = unit();
@@ -205,6 +204,18 @@ class ProcessRun {
     }
     f.wall_s = std::round((from + u * std::max(to - from, 0.05)) * 1e3) / 1e3;
     f.text = text_of(f);
+  }
+
+  /// Of the run in one process from the files that the processes get: what is drawn may have no
+  /// decimal that reads back to the last bit.
+  std::string hash_of_files(const fs::path& folder) const {
+    Scenario files;
+    files.kind = Scenario::Kind::program;
+    files.machine = (folder / "in/machine.toml").string();
+    files.program = (folder / "in/program.ngc").string();
+    files.seed = planned_.scenario.seed;
+    TripLog log;
+    return run_lockout("reference", files, {.work_folder = folder.string()}, log).trace_hash;
   }
 
   void leftovers(const fs::path& folder) {
