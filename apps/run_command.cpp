@@ -44,6 +44,7 @@ namespace fs = std::filesystem;
 
 constexpr int kLeastReadyTimeoutMs = 5000;
 constexpr int kStopTimeoutMs = 5000;           ///< modules, after the NC unit has ended
+constexpr int kNcAgainMs = 1000;               ///< an NC unit that was started again
 constexpr int kResultsTimeoutMs = 300000;      ///< analysis, to write its results
 constexpr int kHastyResultsTimeoutMs = 20000;  ///< the same after Ctrl-C
 
@@ -285,6 +286,9 @@ class Watch {
   void watch_nc_unit(int step_ms) {
     nc_stopped_ms_ = !ending_ && launcher_.stopped("NC unit") ? nc_stopped_ms_ + step_ms : 0;
     if (nc_stopped_ms_ > nc_patience_ms_) stop("the NC unit is stopped, ending ...");
+    // Started again, it finds no module: they have left with the bus.
+    nc_again_ms_ = nc_code_ && launcher_.running("NC unit") ? nc_again_ms_ + step_ms : 0;
+    if (nc_again_ms_ > kNcAgainMs) launcher_.signal("NC unit", SIGKILL);
   }
 
   void stop(const char* what) {
@@ -296,7 +300,7 @@ class Watch {
 
   void note(const Exited& exited) {
     const bool nc = exited.name == "NC unit";
-    if (nc) nc_code_ = exited.code;
+    if (nc && !nc_code_) nc_code_ = exited.code;  // one that was started again leads no run
     struck_.insert(struck_.end(), exited.struck.begin(), exited.struck.end());
     for (const std::string& text : exited.notes) notes_.push_back(exited.name + ": " + text);
     const bool dismissed = exited.name == "analysis" && dismissed_;
@@ -333,7 +337,7 @@ class Watch {
   std::vector<std::string> notes_, struck_;
   bool told_to_stop_ = false, ending_ = false, dismissed_ = false;
   int patience_ms_ = 0;
-  int nc_stopped_ms_ = 0;
+  int nc_stopped_ms_ = 0, nc_again_ms_ = 0;
   const int nc_patience_ms_;
 };
 
