@@ -277,7 +277,12 @@ class ProcessRun {
     if (!ran) return;
     if (node() == kNcUnitName || !told) {
       const bool spindle = node() != "drive spindle";
-      if (node() == kNcUnitName && spindle &&
+      // Without a run-down the modules had been told to stop before: then the axes stood.
+      const bool run_down = notes.find("came to rest") != std::string::npos;
+      for (std::size_t i = 0; i < kAxisCount && !run_down && node() == kNcUnitName; ++i)
+        if (std::abs(last.q_act[i] - before.q_act[i]) > 1e-6)
+          say(fmt::format("drive {} neither stood nor ran down", kAxisNames[i]));
+      if (node() == kNcUnitName && spindle && run_down &&
           notes.find("the spindle is locked") == std::string::npos)
         say("the spindle does not say that it is locked");
       return;
