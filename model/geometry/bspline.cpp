@@ -83,7 +83,8 @@ BSplineCurve::BSplineCurve(int degree, const std::vector<double>& knots,
 
 BSplineCurve::Point BSplineCurve::eval(double u) const {
   u = std::clamp(u, u_min(), u_max());
-  auto i = std::min(static_cast<std::size_t>((u - u_min()) * spans_per_u_), span_count() - 1);
+  const double place = (u - u_min()) * spans_per_u_, last = static_cast<double>(span_count() - 1);
+  auto i = place > 0 ? static_cast<std::size_t>(std::min(place, last)) : 0;  // 0 if not a number
   while (u < breaks_[i]) --i;
   while (i + 1 < span_count() && u >= breaks_[i + 1]) ++i;
 
