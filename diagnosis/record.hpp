@@ -1,0 +1,78 @@
+// A measured run, from wherever it came: signals on one uniform time base.
+//
+// A record holds what a machine told, in SI units, and nothing that was guessed: a sample that is
+// missing is NaN and stays so. Where it came from vcnc's own recording, record_from_recording.hpp
+// fills it; a table of a real machine comes through import_table.hpp and its map.
+//
+// Axes are numbered 0..4 for X Y Z A C. A single axis of any other machine (a ball screw, a robot's
+// joint) takes the place of one of them, by its map.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "model/machine.hpp"
+#include "model/piece_params.hpp"
+
+namespace vcnc {
+
+/// What a signal says.
+enum class SignalKind {
+  command,      ///< position the axis was told to have [m or rad]
+  position,     ///< position by the measuring system the loop is closed with [m or rad]
+  twist,        ///< load side minus motor side [m or rad]
+  force,        ///< force of the drive on the load side [N or N m]
+  deflection,   ///< of the probe, one component in the probe's frame [m]
+  cosine,       ///< raw signal of one probe channel or encoder [V, or share of the converter]
+  sine,         ///< as cosine
+  temperature,  ///< [K]
+  clock         ///< time stamps of the device that measured, where it has a clock of its own [s]
+};
+
+constexpr bool is_compared(SignalKind q) {
+  return q == SignalKind::position || q == SignalKind::twist || q == SignalKind::force ||
+         q == SignalKind::deflection;
+}
+
+/// One signal of a record.
+struct MeasuredSignal {
+  SignalKind kind = SignalKind::position;
+  std::size_t axis = 0;       ///< of the machine; of a deflection: 0, 1, 2 for x, y, z
+  std::string source;         ///< its name where it came from, for messages
+  std::vector<double> value;  ///< SI; NaN: missing
+  double resolution = 0;      ///< step in which its values come, 0: none was found
+};
+
+/// A part of a record whose samples belong together.
+struct Stretch {
+  std::size_t begin = 0, end = 0;  ///< samples [begin, end)
+  int condition = 0;               ///< equal for repetitions of the same motion
+  int repetition = 0;              ///< 0, 1, ... among those of one condition
+  std::string label;               ///< "circle F2000 ccw"
+};
+
+struct Record {
+  std::string source;    ///< the file
+  double period = 1e-3;  ///< between samples [s]
+  double begin = 0;      ///< time of the first sample [s]
+  std::vector<MeasuredSignal> signals;
+  std::vector<Stretch> stretches;     ///< in order of time, not overlapping
+  std::vector<std::string> warnings;  ///< one sentence each
+
+  std::string machine_toml;  ///< declared machine told by the run itself; empty: none
+  std::string piece_toml;    ///< piece in the machine; empty: none
+
+  std::size_t samples() const { return signals.empty() ? 0 : signals.front().value.size(); }
+  /// Null where there is none.
+  const MeasuredSignal* find(SignalKind kind, std::size_t axis) const {
+    for (const MeasuredSignal& s : signals)
+      if (s.kind == kind && s.axis == axis) return &s;
+    return nullptr;
+  }
+};
+
+inline constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace vcnc
