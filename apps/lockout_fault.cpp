@@ -72,10 +72,7 @@ class FaultJudge {
     if (!end_.alarmed && !end_.complete)
       say("no alarm, but the program did not end: " + end_.reason);
     if (case_.within_limit && !moves_axes_ && f_.limit_share >= 1)
-      say(
-          fmt::format("the deflection reached {:.1f} % of the mechanical limit at a feed the NC "
-                      "unit had allowed",
-                      100 * f_.limit_share));
+      say(beyond_limit(f_.limit_share));
     return std::move(found_);
   }
 

@@ -122,6 +122,12 @@ double limit_share(const ProbeParams& p, const Vec3& deflection) {
   return std::max(deflection.head<2>().norm() / lateral, std::abs(deflection.z()) / axial);
 }
 
+std::string beyond_limit(double share) {
+  return fmt::format(
+      "the deflection reached {:.1f} % of the mechanical limit at a feed the NC unit had allowed",
+      100 * share);
+}
+
 void TripTap::cycle(Tick, std::span<const Frame> frames) {
   TripCycle cycle;
   if (!log_.empty()) cycle.measured = log_.back().measured;  // of a drive that is not heard
@@ -241,11 +247,7 @@ class Judge {
     reaction();
     reason();
     if (f_.tripped()) after_trip();
-    if (within_limit && f_.limit_share >= 1)
-      say(
-          fmt::format("the deflection reached {:.1f} % of the mechanical limit at a feed the NC "
-                      "unit had allowed",
-                      100 * f_.limit_share));
+    if (within_limit && f_.limit_share >= 1) say(beyond_limit(f_.limit_share));
     return std::move(found_);
   }
 

@@ -124,5 +124,7 @@ bool truly_standing(const TripLog& log, Tick k);
 
 /// The deflection as a share of where the probe's own protection unit switches.
 double limit_share(const ProbeParams& probe, const Vec3& deflection);
+/// What to say when that was 1 or more although the feed had been allowed.
+std::string beyond_limit(double share);
 
 }  // namespace vcnc

@@ -7,16 +7,6 @@
 namespace vcnc {
 namespace {
 
-std::string refusal(const std::string& text, const Machine& machine) {
-  const ProgramFile file(text);
-  try {
-    Player(file.path(), machine);
-  } catch (const ProgramError& e) {
-    return e.what();
-  }
-  return "";
-}
-
 TEST(PlayerBounds, AMoveThatAnAxisNeedsMoreThanTenHoursForIsRefused) {
   Machine machine;
   machine.probe.in_spindle = false;

@@ -15,16 +15,6 @@
 namespace vcnc {
 namespace {
 
-std::string refusal(const std::string& text, const Machine& machine) {
-  const ProgramFile file(text);
-  try {
-    Player(file.path(), machine);
-  } catch (const ProgramError& e) {
-    return e.what();
-  }
-  return "";
-}
-
 /// The feed that a refusal allows; 0: none.
 double allowed(const std::string& message) {
   std::smatch found;

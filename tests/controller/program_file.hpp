@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "controller/gcode/interpreter.hpp"
+#include "controller/player.hpp"
 
 namespace vcnc {
 
@@ -49,6 +50,17 @@ inline std::vector<Move> read_moves(const std::string& text, const Machine& mach
   for (const Block& block : read_blocks(text, machine))
     if (const Move* move = std::get_if<Move>(&block)) moves.push_back(*move);
   return moves;
+}
+
+/// Why the program is refused before anything moves; empty: it is not.
+inline std::string refusal(const std::string& text, const Machine& machine) {
+  const ProgramFile file(text);
+  try {
+    Player(file.path(), machine);
+  } catch (const ProgramError& e) {
+    return e.what();
+  }
+  return "";
 }
 
 }  // namespace vcnc

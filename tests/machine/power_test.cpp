@@ -126,6 +126,22 @@ double seconds_into(const Outcome& run,
 
 // ------------------------------------------------------------------------------ in one run
 
+/// A wall square to X at 100 mm, the axes before it.
+struct WallAt100mm {
+  TemporaryFile piece{"power-wall.toml", to_toml(plane())};
+  Machine machine =
+      load_machine(configs("machines/trunnion.toml"),
+                   {"setup.piece=" + piece.path(), "axes.X.start_mm=130", "axes.Z.start_mm=250"});
+
+  static PieceParams plane() {
+    PieceParams plane;
+    plane.kind = PieceParams::Kind::plane;
+    plane.centre = {0.1, 0, 0};
+    plane.direction = Vec3::UnitX();
+    return plane;
+  }
+};
+
 TEST(Power, HoldsRetractsAndSavesInThisOrder) {
   Memories memories;
   const Outcome run =
@@ -197,14 +213,8 @@ TEST(Power, WithoutALossTheMemoryChangesNoBit) {
 TEST(Power, ALossDuringTheReturnIsRiddenOutToo) {
   const std::string program =
       "G90 G21 G54\nM19\nG43 H1\nG0 X105 Y0 Z100\nG1 X102.5 F1000\nG1 Y40 F2000\nM30\n";
-  PieceParams plane;
-  plane.kind = PieceParams::Kind::plane;
-  plane.centre = {0.1, 0, 0};
-  plane.direction = Vec3::UnitX();
-  const TemporaryFile piece("power-plane.toml", to_toml(plane));
-  const Machine machine =
-      load_machine(configs("machines/trunnion.toml"),
-                   {"setup.piece=" + piece.path(), "axes.X.start_mm=130", "axes.Z.start_mm=250"});
+  const WallAt100mm wall;
+  const Machine& machine = wall.machine;
   const Outcome whole = run_on(machine, program, {});
   ASSERT_TRUE(whole.nc.end.complete);
   std::size_t contact = 0;
@@ -389,14 +399,8 @@ TEST(Power, ALockedSpindleRefusesEveryStart) {
 }
 
 TEST(Power, ATripSurvivesSwitchingOff) {
-  PieceParams plane;
-  plane.kind = PieceParams::Kind::plane;
-  plane.centre = {0.1, 0, 0};
-  plane.direction = Vec3::UnitX();
-  const TemporaryFile piece("power-wall.toml", to_toml(plane));
-  const Machine machine =
-      load_machine(configs("machines/trunnion.toml"),
-                   {"setup.piece=" + piece.path(), "axes.X.start_mm=130", "axes.Z.start_mm=250"});
+  const WallAt100mm wall;
+  const Machine& machine = wall.machine;
   const std::string crash = "G90 G21 G54\nM19\nG43 H1\nG0 X120 Y0 Z100\nG1 X60 F1000\nM30\n";
   const std::string harmless = "G90 G21 G54\nG43 H1\nG0 X125 Y0 Z100\nM30\n";
   Memories memories;
