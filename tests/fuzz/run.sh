@@ -16,7 +16,7 @@ fi
 mkdir -p "build/fuzz/corpus/$name" build/fuzz/findings
 # Several may run at once; the build is for one at a time.
 flock build/fuzz/lock bash -c "{ cmake --preset fuzz && cmake --build build/fuzz --target vcnc_fuzz_$name; } >/dev/null"
-flags=(-max_total_time="$seconds" -timeout=20 -rss_limit_mb=2048 -print_funcs=0 -verbosity=0
+flags=(-max_total_time="$seconds" -timeout=60 -rss_limit_mb=2048 -print_funcs=0 -verbosity=0
   -artifact_prefix="build/fuzz/findings/$name-")
 [[ -f tests/fuzz/$name.dict ]] && flags+=(-dict="tests/fuzz/$name.dict")
 # HDF5 leaks, and asks for what a damaged file claims to hold; only the child that tries it does.
