@@ -78,7 +78,7 @@ class RecordingReader {
   struct File;
   void open();
   void try_in_child();
-  bool last_block_reads() const;
+  void drop_unwritten();
   std::optional<std::vector<TelemetryRow>> read_block(std::uint64_t at, std::uint64_t rows) const;
 
   std::filesystem::path path_;

@@ -1,17 +1,11 @@
-#include <fcntl.h>
-#include <signal.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <bit>
 #include <charconv>
 #include <optional>
-#include <string_view>
 
 #include "analysis/hdf5_file.hpp"
 #include "analysis/recording.hpp"
 #include "analysis/seal.hpp"
+#include "analysis/tried_read.hpp"
 #include "analysis/whole_file.hpp"
 
 namespace vcnc {
@@ -97,46 +91,13 @@ RecordingReader::RecordingReader(const std::filesystem::path& path)
 
 /// Reads everything once in a child process; throws what that finds, or that it died of it.
 void RecordingReader::try_in_child() {
-  // HDF5 may also run for ever; a sound file takes a hundredth of this.
-  constexpr rlim_t kShortest = 1, kBytesPerSecond = 10'000'000;
-  std::error_code unknown;
-  const rlim_t seconds = kShortest + std::filesystem::file_size(path_, unknown) / kBytesPerSecond;
-  std::array<int, 2> answer{-1, -1};  // the sentence, where the file is refused
-  const pid_t child = pipe2(answer.data(), O_CLOEXEC) == 0 ? fork() : -1;
-  if (child == 0) {
-    for (const int deadly : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) signal(deadly, SIG_DFL);
-    const rlimit none{0, 0}, time{seconds, seconds};
-    setrlimit(RLIMIT_CORE, &none);
-    setrlimit(RLIMIT_CPU, &time);
-    bool opened = false;
+  vcnc::try_in_child(path_, kDamaged, [this] {
+    open();
     try {
-      open();
-      opened = true;
       for_each([](const TelemetryRow&) {});
-    } catch (const RecordingError& e) {
-      const std::string_view text = e.what();  // rows that cannot be read: whoever asks for them
-      if (!opened && ::write(answer[1], text.data(), text.size()) < 0) _exit(1);
-    } catch (...) {
-      _exit(1);
+    } catch (const RecordingError&) {  // rows that cannot be read: whoever asks for them
     }
-    _exit(0);
-  }
-  close(answer[1]);
-  std::string refusal;
-  std::array<char, 512> part{};
-  for (ssize_t got; child > 0 && (got = ::read(answer[0], part.data(), part.size())) != 0;)
-    if (got > 0)
-      refusal.append(part.data(), static_cast<std::size_t>(got));
-    else if (errno != EINTR)
-      break;
-  close(answer[0]);
-  if (child < 0) fail(path_, "no process to check the recording in");
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  errno = 0;
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) fail(path_, kDamaged);
-  if (!refusal.empty()) throw RecordingError(refusal);
+  });
 }
 
 void RecordingReader::open() {
@@ -175,17 +136,29 @@ void RecordingReader::open() {
     end_ = *end;
   } else {
     need(false, "end of the run");
-    while (rows_ > 0 && !last_block_reads()) rows_ = (rows_ - 1) / kBlockRows * kBlockRows;
+    drop_unwritten();
     end_.cycles = static_cast<std::int64_t>(rows_);
   }
 }
 
 RecordingReader::~RecordingReader() = default;
 
-/// A writer that was killed may have announced a block and not written it.
-bool RecordingReader::last_block_reads() const {
-  const hsize_t at = (rows_ - 1) / kBlockRows * kBlockRows;
-  return read_block(at, rows_ - at).has_value();
+/// A writer that was killed may have announced a block and not written it, or not all of it: then
+/// it cannot be read, or its rows are zeros, whose ticks do not go on. The row before the first of
+/// these may be torn.
+void RecordingReader::drop_unwritten() {
+  for (bool whole = false; rows_ > 0 && !whole;) {
+    const std::uint64_t at = (rows_ - 1) / kBlockRows * kBlockRows;
+    const auto block = read_block(at, rows_ - at);
+    const auto before = at > 0 ? read_block(at - 1, 1) : std::nullopt;
+    double last = before ? before->front().tick : -1;
+    std::uint64_t written = 0;
+    while (block && written < block->size() && (*block)[written].tick > last)
+      last = (*block)[written++].tick;
+    whole = block && written == block->size();
+    if (!whole) rows_ = at + (written > 0 ? written - 1 : 0);
+    if (written > 1) whole = true;
+  }
 }
 
 /// Nothing where the file does not hold them.

@@ -4,11 +4,14 @@
 #include <string>
 #include <vector>
 
+#include "apps/program_options.hpp"
+
 namespace vcnc {
 
 struct CheckOptions {
   std::vector<std::string> programs, assignments;
   std::string machine;
+  ProgramChoice how;
 };
 
 /// Runs the whole interpretation and, with a machine, every check before motion: travel, feeds,

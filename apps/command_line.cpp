@@ -7,9 +7,13 @@
 
 #include "analysis/session.hpp"
 #include "apps/check_command.hpp"
+#include "apps/commission_command.hpp"
 #include "apps/compare_command.hpp"
+#include "apps/compensate_command.hpp"
+#include "apps/diagnose_command.hpp"
 #include "apps/effects_command.hpp"
 #include "apps/gallery_command.hpp"
+#include "apps/import_command.hpp"
 #include "apps/interpret_command.hpp"
 #include "apps/lockout_command.hpp"
 #include "apps/memory_command.hpp"
@@ -49,6 +53,22 @@ std::uint64_t parse_seed(const std::string& text) {
   return seed;
 }
 
+/// What run, plan and check say about a program.
+void add_program_options(CLI::App& command, ProgramChoice& how) {
+  command.add_flag("--block-delete", how.block_delete, "skip lines that begin with /");
+  command.add_option("--from-line", how.from_line,
+                     "begin at this line of the program, with every mode as if it had been played "
+                     "up to there");
+  command.add_option("--from-block", how.from_block, "the same for the block N.., e.g. N40");
+  command
+      .add_option("--program-path", how.program_path,
+                  "a folder of subprograms, searched before those of nc.program_path")
+      ->allow_extra_args(false);
+  command.add_option("--tools", how.tools, "tool table of LinuxCNC, instead of the machine's");
+  command.add_option("--tools-unit", how.tools_unit, "unit of its numbers: mm (default) or inch")
+      ->check(CLI::IsMember({"mm", "inch"}));
+}
+
 void add_run(CLI::App& app, int& code) {
   struct Arguments : RunOptions {
     std::string pace_text = "free", seed_text = "1";
@@ -69,6 +89,11 @@ void add_run(CLI::App& app, int& code) {
   run->add_option("--fault", o->faults,
                   "a fault, e.g. \"probe mute from_s=1.5 for_s=0.005\" (see vcnc faults)")
       ->allow_extra_args(false);
+  run->add_option("--operate", o->operations,
+                  "what the operator does, e.g. \"at 3.2 s feed 50 %\", or a file of such lines "
+                  "(docs/operating.md)")
+      ->allow_extra_args(false);
+  add_program_options(*run, o->how);
   run->add_option("--random-faults", o->random_faults,
                   "so many faults of the simulation, drawn from --seed over the program's time")
       ->check(CLI::Range(0, 1000));
@@ -80,7 +105,8 @@ void add_run(CLI::App& app, int& code) {
   run->add_option("--seed", o->seed_text, "seed of all noise (default 1)");
   run->add_option("--out", o->out, "folder for the results")->required();
   run->add_option("--memory", o->memory,
-                  "folder of what the machine keeps while it is off: latches, interrupted program");
+                  "folder of what the machine keeps while it is off: latches, interrupted program, "
+                  "offsets, parameters, tools");
   run->add_option("--on-power-return", o->on_power_return,
                   "when the mains return after a loss: end (default) or resume")
       ->check(CLI::IsMember({"end", "resume"}));
@@ -98,10 +124,18 @@ void add_run(CLI::App& app, int& code) {
 
 void add_memory(CLI::App& app) {
   const auto folder = std::make_shared<std::string>();
+  const auto o = std::make_shared<MemoryOptions>();
   CLI::App* memory =
       app.add_subcommand("memory", "what a machine keeps while it is off (vcnc run --memory)");
-  memory->add_option("DIR", *folder, "folder given as --memory")->required();
-  memory->callback([folder] { memory_command(*folder); });
+  memory->add_option("DIR", o->folder, "folder given as --memory")->required();
+  memory->add_option("--write-tools", o->write_tools, "write the tools kept as a tool table");
+  memory->add_option("--read-tools", o->read_tools, "keep the tools of a tool table of LinuxCNC");
+  memory->add_option("--tools-unit", o->tools_unit, "unit of tool tables: mm (default) or inch")
+      ->check(CLI::IsMember({"mm", "inch"}));
+  memory->add_option("--write-parameters", o->write_parameters,
+                     "write the parameters kept as LinuxCNC's parameter file");
+  memory->add_flag("--forget-data", o->forget, "drop offsets, parameters and tools");
+  memory->callback([o] { memory_command(*o); });
   CLI::App* reset = app.add_subcommand(
       "reset", "the operator's reset: open every latch, drop an interrupted program");
   reset->add_option("DIR", *folder, "folder given as --memory")->required();
@@ -116,7 +150,13 @@ void add_plan(CLI::App& app) {
   plan->add_option("--machine", o->machine, "machine file (TOML)")->required();
   plan->add_option("--set", o->assignments, "override a key of the machine file")
       ->allow_extra_args(false);
+  plan->add_option("--dynamics", o->dynamics, "smooth or fast, for programs that do not choose");
   plan->add_option("--csv", o->csv, "write every cycle: time, axes, tip, feed, program line");
+  plan->add_option("--operate", o->operations,
+                   "what the operator does, e.g. \"at 3.2 s feed 50 %\", or a file of such lines")
+      ->allow_extra_args(false);
+  add_program_options(*plan, o->how);
+  plan->add_option("--memory", o->how.memory, "with the offsets, parameters and tools kept there");
   plan->callback([o] { plan_command(*o); });
 }
 
@@ -185,6 +225,68 @@ void add_compare(CLI::App& app, int& code) {
   compare->callback([o, &code] { code = compare_command(*o); });
 }
 
+void add_compensate(CLI::App& app, int& code) {
+  const auto o = std::make_shared<CompensateOptions>();
+  CLI::App* compensate = app.add_subcommand(
+      "compensate", "set the NC unit's compensation against the effects of a machine");
+  compensate->add_option("MACHINE", o->machine, "machine file with effects")->required();
+  compensate->add_option("--set", o->assignments, "override a key of the machine file")
+      ->allow_extra_args(false);
+  compensate->add_option("--inject", o->injections, "a further effect, as in vcnc run")
+      ->allow_extra_args(false);
+  compensate->add_option("--out", o->out, "machine file to write, with nc.compensation set");
+  compensate->add_flag("--measure", o->measure,
+                       "run a circle and the S piece before and after, print the dynamic error");
+  compensate->callback([o, &code] { code = compensate_command(*o); });
+}
+
+void add_import(CLI::App& app) {
+  const auto o = std::make_shared<ImportOptions>();
+  CLI::App* command =
+      app.add_subcommand("import", "a table of a real machine (CSV, HDF5) as a record to diagnose");
+  command->add_option("TABLE", o->table, "what was measured");
+  command->add_option("--map", o->map, "what its columns are (TOML)");
+  command->add_option("--out", o->out, "record to write");
+  command->add_flag("--keys", o->keys, "show the keys of a map, as Markdown");
+  command->callback([o] { import_command(*o);
+});
+}  // namespace
+
+void add_diagnose(CLI::App& app, int& code) {
+  const auto o = std::make_shared<DiagnoseOptions>();
+  CLI::App* diagnose =
+      app.add_subcommand("diagnose", "why a measured machine is not as its file declares");
+  diagnose
+      ->add_option("RUN", o->run,
+                   "recording or folder of a run, imported record, or table with --map")
+      ->required();
+  diagnose->add_option("--model", o->model,
+                       "declared machine file (default: the one the run was made with)");
+  diagnose->add_option("--map", o->map, "what the columns of tables are (see vcnc import)");
+  diagnose->add_option("--reference", o->reference,
+                       "the same program when the machine was healthy");
+  diagnose->add_option("--without", o->without,
+                       "an effect the library is to be without: what it makes then has no name");
+  diagnose->add_option("--test", o->tests, "a run to be predicted, not fitted")
+      ->allow_extra_args(false);
+  diagnose->add_option("--out", o->out, "folder for diagnosis.json, found.toml and report.html");
+  diagnose->add_option("--compare-only", o->compare,
+                       "machine file: only tell how well the two machines predict the run");
+  diagnose->callback([o, &code] { code = diagnose_command(*o); });
+}
+
+void add_commission(CLI::App& app, int& code) {
+  const auto o = std::make_shared<CommissionOptions>();
+  CLI::App* commission =
+      app.add_subcommand("commission", "fit a declared machine to a run of the healthy one");
+  commission->add_option("RUN", o->run, "as of vcnc diagnose")->required();
+  commission->add_option("--model", o->model,
+                         "declared machine file (default: the one the run was made with)");
+  commission->add_option("--map", o->map, "what the columns of a table are (see vcnc import)");
+  commission->add_option("--out", o->out, "machine file to write")->required();
+  commission->callback([o, &code] { code = commission_command(*o); });
+}
+
 void add_lockout(CLI::App& app, int& code) {
   struct Arguments : LockoutArguments {
     std::string seed_text = "1";
@@ -240,6 +342,10 @@ void add_interpret(CLI::App& app, int& code) {
       ->check(CLI::IsMember({"mm", "inch"}));
   interpret->add_option("--dialect", o->dialect, "auto (default), ngc, fanuc or siemens")
       ->check(CLI::IsMember({"auto", "ngc", "fanuc", "siemens"}));
+  interpret
+      ->add_option("--program-path", o->program_path,
+                   "a folder of subprograms, searched after the program's own")
+      ->allow_extra_args(false);
   interpret->add_flag("--block-delete", o->block_delete, "skip lines that begin with /");
   interpret->callback([o, &code] { code = interpret_command(*o); });
 }
@@ -251,6 +357,8 @@ void add_check(CLI::App& app) {
   check->add_option("--machine", o->machine, "machine file; default: only the language is checked");
   check->add_option("--set", o->assignments, "override a key of the machine file")
       ->allow_extra_args(false);
+  add_program_options(*check, o->how);
+  check->add_option("--memory", o->how.memory, "with the offsets, parameters and tools kept there");
   check->callback([o] { check_command(*o); });
 }
 
@@ -293,7 +401,7 @@ void refuse_empty_values(CLI::App& app) {
   for (CLI::App* sub : app.get_subcommands({})) refuse_empty_values(*sub);
 }
 
-}  // namespace
+}  // namespace vcnc
 
 int command_line(int argc, char** argv) {
   CLI::App app{"vcnc: a virtual five-axis CNC machine that behaves like a measured one"};
@@ -306,6 +414,10 @@ int command_line(int argc, char** argv) {
   add_analyze(app);
   add_gallery(app, code);
   add_compare(app, code);
+  add_compensate(app, code);
+  add_import(app);
+  add_diagnose(app, code);
+  add_commission(app, code);
   add_program_command(app);
   add_interpret(app, code);
   add_check(app);

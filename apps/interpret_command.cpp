@@ -6,6 +6,7 @@
 
 #include "apps/node_options.hpp"
 #include "apps/path_writer.hpp"
+#include "apps/program_options.hpp"
 #include "configs/config.hpp"
 #include "controller/gcode/interpreter.hpp"
 #include "controller/program_error.hpp"
@@ -20,8 +21,7 @@ InterpreterOptions interpreter_options(const InterpretOptions& options) {
                    : options.dialect == "fanuc"   ? Dialect::fanuc
                    : options.dialect == "siemens" ? Dialect::siemens
                                                   : Dialect::automatic;
-  if (!options.tools.empty())
-    result.tools = ToolTable::read(options.tools, options.tools_unit == "inch" ? 25.4e-3 : 1e-3);
+  if (!options.tools.empty()) result.tools = read_tools(options.tools, options.tools_unit);
   result.block_delete = options.block_delete;
   result.bare = options.machine.empty();
   return result;
@@ -37,8 +37,9 @@ Machine bare_machine() {
 }  // namespace
 
 int interpret_command(const InterpretOptions& options) {
-  const Machine machine =
-      options.machine.empty() ? bare_machine() : load_machine(options.machine, options.assignments);
+  const Machine machine = with_program_path(
+      options.machine.empty() ? bare_machine() : load_machine(options.machine, options.assignments),
+      options.program_path);
   InterpreterOptions wanted = interpreter_options(options);
   using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
   File file(options.json.empty() ? nullptr : std::fopen(options.json.c_str(), "wb"), &std::fclose);

@@ -8,7 +8,7 @@ namespace vcnc {
 
 struct InterpretOptions {
   std::string program, json, machine, tools, tools_unit = "mm", dialect = "auto";
-  std::vector<std::string> assignments;
+  std::vector<std::string> assignments, program_path;
   bool block_delete = false;
 };
 

@@ -11,17 +11,29 @@
 namespace vcnc {
 
 NcRecord identity_of(const Machine& machine, const std::string& piece_toml,
-                     const std::string& program) {
+                     const std::string& program, const PlayerOptions& options) {
   std::ifstream in(program, std::ios::binary);
-  const std::string text(std::istreambuf_iterator<char>(in), {});
+  std::string text(std::istreambuf_iterator<char>(in), {});
   if (in.bad() || !in.is_open()) throw InputError(program + ": cannot be read");
+  if (options.from_line > 0) text += fmt::format("\nfrom line {}", options.from_line);
+  if (options.interpreter.block_delete) text += "\nblock delete";
+  if (options.interpreter.tools) text += '\n' + options.interpreter.tools->to_text(1);
   Machine content = machine;
   content.setup.piece.clear();  // its place does not matter, what it says does
+  content.nc.program_path.clear();
   NcRecord identity;
   identity.program = std::filesystem::absolute(program).string();
   identity.program_hash = hash_of(text);
   identity.machine_hash = hash_of(to_toml(content) + piece_toml);
   return identity;
+}
+
+KeptNcData load_nc_data(NodeMemory& memory) {
+  const std::vector<std::uint8_t> bytes = memory.load();
+  if (bytes.empty()) return {};
+  std::optional<KeptNcData> data = decode_nc_data(bytes);
+  if (!data) refuse_state("NC unit's offsets and tools");
+  return std::move(*data);
 }
 
 void check_resume(const std::optional<NcRecord>& kept, const NcRecord& now,

@@ -14,6 +14,11 @@ MemoryContent read_content(const MemoryFolder& folder) {
     content.nc = decode_record(kept);
     if (!content.nc) refuse_state("NC unit");
   }
+  if (const auto kept = state("data"); !kept.empty()) {
+    const auto data = decode_nc_data(kept);
+    if (!data) refuse_state("NC unit's offsets and tools");
+    content.data = data->now;
+  }
   if (const auto kept = state("spindle"); !kept.empty()) {
     const auto locked = decode_spindle_lock(kept);
     if (!locked) refuse_state("spindle");
@@ -65,6 +70,7 @@ std::string to_text(const MemoryContent& content) {
                       text_of(content.nc ? content.nc->protection : ProtectionLatch{}));
   text += fmt::format("overtravel   {}\n", text_of(content.overtravel));
   text += fmt::format("spindle      {}\n", content.spindle_locked ? "locked" : "not locked");
+  text += to_text(content.data);
   return text;
 }
 

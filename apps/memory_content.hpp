@@ -5,6 +5,7 @@
 #include <string>
 
 #include "apps/memory_folder.hpp"
+#include "controller/gcode/nc_data.hpp"
 #include "controller/nc_record.hpp"
 #include "model/safety/protection.hpp"
 
@@ -12,6 +13,7 @@ namespace vcnc {
 
 struct MemoryContent {
   std::optional<NcRecord> nc;  ///< nothing: no program has run
+  NcData data;                 ///< what programs have changed at the control
   bool spindle_locked = false;
   ProtectionLatch overtravel;
 };

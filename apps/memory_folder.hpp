@@ -4,6 +4,7 @@
 //   nc.0       nc.1       the NC unit's record (controller/nc_record.hpp)
 //   spindle.0  spindle.1  the latch of the spindle's lock (servo_sim/spindle_node.hpp)
 //   overtravel.0 .1       the latch of the overtravel module (probe_sim/overtravel_node.hpp)
+//   data.0     data.1     offsets, parameters and tools (controller/gcode/nc_data.hpp)
 //
 // Two slots for each module, written in turn (bus/memory_slot.hpp): overwritten in place, then
 // fsync. Whoever starts a machine holds a lock on the folder; the modules' programs open their own
@@ -40,7 +41,9 @@ class SlotFiles : public NodeMemory {
   std::string module_;
 };
 
-inline constexpr std::array kMemoryOwners{"nc", "spindle", "overtravel"};
+inline constexpr std::array kMemoryOwners{"nc", "spindle", "overtravel", "data"};
+/// Of them, what the operator's reset opens.
+inline constexpr std::array kLatchOwners{"nc", "spindle", "overtravel"};
 
 class MemoryFolder {
  public:

@@ -6,6 +6,8 @@
 #include "apps/memory_folder.hpp"
 #include "apps/nc_run.hpp"
 #include "apps/node_options.hpp"
+#include "apps/operations.hpp"
+#include "apps/program_options.hpp"
 #include "apps/stop_signal.hpp"
 #include "bus/dds/dds_publisher.hpp"
 #include "configs/config.hpp"
@@ -24,7 +26,7 @@ int nc(int argc, char** argv) {
   telemetry.paced = options.pace > 0;
   DdsPublisher publisher(telemetry);
   publisher.wait_for_subscriber(kSubscriberTimeoutMs);
-  SlotFiles memory(options.memory, "nc");
+  SlotFiles memory(options.memory, "nc"), data(options.memory, "data");
   const NcRunResult result = run_nc(
       machine,
       {.program = options.program,
@@ -35,11 +37,17 @@ int nc(int argc, char** argv) {
        .faults = parse_faults(options.faults),
        .answer_timeout_ms = options.answer_timeout_ms,
        .memory = options.memory.empty() ? nullptr : &memory,
+       .data = options.memory.empty() ? nullptr : &data,
        .on_power_return =
            options.on_power_return == "resume" ? OnPowerReturn::resume : OnPowerReturn::end,
-       .resume = options.resume},
+       .resume = options.resume,
+       .operations = read_operations(options.operations),
+       .player = player_options(options)},
       *transport, publisher);
   for (const std::string& fault : result.struck) ControlPipe(options.control_fd).struck(fault);
+  for (const std::string& text : result.never_operated)
+    ControlPipe(options.control_fd)
+        .note("--operate \"" + text + "\": there was no occasion for it");
   if (result.exit_code() == kExitFailure) std::cerr << result.end.reason;
   return result.exit_code();
 }

@@ -18,9 +18,17 @@ namespace {
 
 /// What the NC unit begins with: its record as far as it concerns this program.
 NcUnitOptions begin_with(const Machine& machine, const NcRunOptions& options) {
-  NcUnitOptions nc{.on_power_return = options.on_power_return, .memory = options.memory};
+  NcUnitOptions nc{.on_power_return = options.on_power_return,
+                   .memory = options.memory,
+                   .operations = options.operations,
+                   .player = options.player};
   if (options.memory == nullptr) return nc;
-  nc.record = identity_of(machine, options.piece_toml, options.program);
+  nc.data = options.data;
+  if (options.data) {
+    nc.kept = load_nc_data(*options.data);
+    nc.player.interpreter.data = options.resume ? nc.kept.begin : nc.kept.now;
+  }
+  nc.record = identity_of(machine, options.piece_toml, options.program, options.player);
   const std::vector<std::uint8_t> bytes = options.memory->load();
   const std::optional<NcRecord> kept = decode_record(bytes);
   if (!kept && !bytes.empty()) refuse_state("NC unit");
@@ -73,6 +81,7 @@ NcRunResult run_nc(const Machine& machine, const NcRunOptions& options, Transpor
   NcRunResult result;
   result.alarmed = nc.alarmed() || supplied.dark();
   result.struck = faulted.struck();
+  result.never_operated = nc.never_operated();
   for (const BusFault& fault : options.faults)
     if (fault.of_supply() && supplied.struck()) result.struck.push_back(fault.text);
   result.node_lost = !loop.lost_nodes.empty();

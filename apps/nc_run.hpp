@@ -25,8 +25,11 @@ struct NcRunOptions {
   int answer_timeout_ms = 5000;             ///< of host time, for each module in each cycle
   std::vector<FrameTap*> taps{};            ///< see every frame
   NodeMemory* memory = nullptr;             ///< of the NC unit
+  NodeMemory* data = nullptr;               ///< its offsets, parameters and tools
   OnPowerReturn on_power_return = OnPowerReturn::end;
-  bool resume = false;  ///< the program that the memory says was interrupted
+  bool resume = false;                  ///< the program that the memory says was interrupted
+  std::vector<Operation> operations{};  ///< what the operator does at the panel
+  PlayerOptions player{};
 };
 
 struct NcRunResult {
@@ -35,6 +38,7 @@ struct NcRunResult {
   bool interrupted = false;           ///< Ctrl-C
   bool node_lost = false;             ///< a module's program failed
   std::vector<std::string> struck{};  ///< faults of the NC unit that have had an effect
+  std::vector<std::string> never_operated{};
   int exit_code() const;
 };
 

@@ -20,6 +20,12 @@ NodeOptions parse_node_options(int argc, char** argv, const char* description, c
     app.add_option("--on-power-return", o.on_power_return, "when the mains return")
         ->check(CLI::IsMember({"end", "resume"}));
     app.add_flag("--resume", o.resume, "go on with the interrupted program");
+    app.add_option("--operate", o.operations, "what the operator does, e.g. \"at 3.2 s feed 50 %\"")
+        ->allow_extra_args(false);
+    app.add_flag("--block-delete", o.block_delete, "skip lines that begin with /");
+    app.add_option("--from-line", o.from_line, "the program begins there");
+    app.add_option("--tools", o.tools, "tool table of LinuxCNC");
+    app.add_option("--tools-unit", o.tools_unit, "mm or inch");
   }
   if (with('b')) {
     app.add_option("--bus", o.bus, "hub:///PATH or can://INTERFACE")->required();

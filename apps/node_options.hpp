@@ -24,7 +24,11 @@ struct NodeOptions {
   std::vector<double>
       switched_on_at;  ///< axis positions [m, rad]; empty: those of the machine file
   std::string on_power_return = "end";
-  bool resume = false;  ///< NC unit: the program that was interrupted
+  bool resume = false;                   ///< NC unit: the program that was interrupted
+  std::vector<std::string> operations;   ///< NC unit: in the text form of controller/operation.hpp
+  bool block_delete = false;             ///< NC unit
+  int from_line = 0;                     ///< NC unit: the program begins there
+  std::string tools, tools_unit = "mm";  ///< NC unit: tool table of LinuxCNC
   int control_fd = -1;
 };
 

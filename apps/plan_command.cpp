@@ -7,6 +7,7 @@
 #include <iostream>
 #include <iterator>
 
+#include "apps/operations.hpp"
 #include "bus/tick.hpp"
 #include "configs/config.hpp"
 #include "controller/limit_use.hpp"
@@ -50,23 +51,51 @@ class PlanCsv {
   std::ofstream file_;
 };
 
+/// What the operator does in this cycle.
+void operate(Player& player, OperatorPanel& panel, Tick cycle, int line) {
+  if (panel.empty()) return;
+  for (const Operation& operation : panel.due(cycle, line)) {
+    if (operation.kind == Operation::Kind::hold) player.feed_hold();
+    if (operation.kind == Operation::Kind::start) player.cycle_start();
+  }
+  player.operate(panel.switches());
+  player.attended(panel.start_to_come());
+}
+
 }  // namespace
 
 void plan_command(const PlanOptions& options) {
-  const Machine machine = load_machine(options.machine, options.assignments);
+  std::vector<std::string> assignments = options.assignments;
+  if (!options.dynamics.empty()) assignments.push_back("nc.dynamics=" + options.dynamics);
+  const Machine machine =
+      with_program_path(load_machine(options.machine, assignments), options.how.program_path);
+  OperatorPanel panel(read_operations(options.operations));
   try {
-    Player player(options.program, machine);
+    Player player(options.program, machine, player_options(options.how, options.program));
+    if (player.begins_at()) std::cout << text_of_begin(player) << '\n';
     AxisVector start;
     for (std::size_t i = 0; i < kAxisCount; ++i) start[i] = machine.axes[i].limits.start;
     LimitUse use(machine, start);
     PlanCsv csv(options.csv);
-    Tick cycles = 0, waiting = 0;
-    for (PlayerStep step = player.step(); !step.done; step = player.step()) {
+    Tick cycles = 0, waiting = 0, at_zero = 0;
+    PlayerStep step;
+    while (true) {
+      operate(player, panel, cycles, step.line);
+      at_zero = player.stands_at_zero() ? at_zero + 1 : 0;
+      if (seconds(at_zero) > kProgramStopSeconds && !panel.timed_to_come())
+        throw InputError(
+            fmt::format("--operate: the axes stand on line {} at an override of 0 %, "
+                        "and nothing more is operated",
+                        step.line));
+      step = player.step();
+      if (step.done) break;
       use.add(step.position);
       csv.add(++cycles, step);
       waiting += step.dwell;
     }
     csv.close();
+    for (const std::string& text : panel.never())
+      std::cerr << "vcnc: warning: --operate \"" << text << "\": there was no occasion for it\n";
     std::cout << fmt::format("total time {:.3f} s, of which {:.3f} s waiting\n", seconds(cycles),
                              seconds(waiting));
     std::cout << "largest share of the limits   v [%]   a [%]   j [%]\n";

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "configs/config.hpp"
+#include "controller/diagnosis_program.hpp"
 #include "controller/player.hpp"
 #include "controller/program_writer.hpp"
 #include "model/geometry/piece.hpp"
@@ -35,6 +36,7 @@ std::string program_text(const std::string& kind, const Machine& machine, const 
   if (kind == "s-piece") return s_piece_program(machine, needed(piece), a);
   if (kind == "cone") return cone_program(machine, needed(piece), a);
   if (kind == "circle") return circle_program(machine, piece.get(), a);
+  if (kind == "diagnosis") return diagnosis_program(machine, piece.get(), a);
   return step_program(machine, a);
 }
 
@@ -122,6 +124,17 @@ void add_program_command(CLI::App& app) {
       ->check(CLI::IsMember({17, 18, 19}));
   circle->add_option("--height-mm", a->height_mm,
                      "of the ball centre; default: mid-height of the ring");
+
+  const auto d = std::make_shared<Arguments>();
+  d->laps = 2;
+  d->feed_mm_min = 2200;
+  CLI::App* diagnosis =
+      add_kind(*program, "diagnosis", "rings, ladders, lines and spins that show most effects", d);
+  diagnosis->add_option("--laps", d->laps, "of each ring")->check(CLI::Range(2, 100));
+  diagnosis->add_option("--radius-mm", d->radius_mm, "of the rings without a piece")
+      ->check(CLI::PositiveNumber);
+  diagnosis->add_option("--predeflection-mm", d->predeflection_mm,
+                        "interference; default: setup.predeflection_mm");
 
   CLI::App* step = add_kind(*program, "step", "one axis in steps forward and back, with dwell", a);
   step->add_option("--axis", a->axis, "X Y Z A C")->check(CLI::IsMember({"X", "Y", "Z", "A", "C"}));

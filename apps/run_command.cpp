@@ -26,6 +26,7 @@
 #include "apps/memory_content.hpp"
 #include "apps/nc_run.hpp"
 #include "apps/node_options.hpp"
+#include "apps/operations.hpp"
 #include "apps/progress_line.hpp"
 #include "apps/run_folder.hpp"
 #include "apps/stop_signal.hpp"
@@ -86,7 +87,9 @@ Continuation open_memory(const RunOptions& options, const Machine& machine,
       check_fresh(content.nc, options.memory);
       return start;
     }
-    check_resume(content.nc, identity_of(machine, piece ? to_toml(*piece) : "", options.program),
+    check_resume(content.nc,
+                 identity_of(machine, piece ? to_toml(*piece) : "", options.program,
+                             player_options(options.how, options.program)),
                  options.memory);
     const Machine believed = as_nc_believes(machine);
     const AxisVector position = position_at_switch_on(believed, *content.nc);
@@ -108,6 +111,11 @@ void warn(const std::vector<std::string>& never) {
               << "\": had no effect; the run was over before, or no such frame was sent\n";
 }
 
+void warn_not_operated(const std::vector<std::string>& never) {
+  for (const std::string& text : never)
+    std::cerr << "vcnc: warning: --operate \"" << text << "\": there was no occasion for it\n";
+}
+
 /// Drawn over the time that the program takes; written as --fault takes them.
 std::vector<std::string> drawn_faults(const RunOptions& options, Player& player) {
   Tick cycles = 0;
@@ -125,8 +133,8 @@ int run_in_process(const RunOptions& options, const Machine& machine, const Piec
     if (fault.of_host())
       throw InputError("--fault \"" + fault.text +
                        "\": needs processes; this run has all modules in one");
-  SlotFiles nc(options.memory, "nc"), spindle(options.memory, "spindle"),
-      overtravel(options.memory, "overtravel");
+  SlotFiles nc(options.memory, "nc"), data(options.memory, "data"),
+      spindle(options.memory, "spindle"), overtravel(options.memory, "overtravel");
   const auto kept = [&](SlotFiles& files) { return start.folder ? &files : nullptr; };
   VirtualMachine modules(switched_on_at(machine, start.switched_on_at), piece, options.seed, faults,
                          {kept(spindle), kept(overtravel)});
@@ -142,13 +150,17 @@ int run_in_process(const RunOptions& options, const Machine& machine, const Piec
                                      .stop = &stop_requested(),
                                      .faults = faults,
                                      .memory = kept(nc),
+                                     .data = kept(data),
                                      .on_power_return = on_power_return(options),
-                                     .resume = options.resume},
+                                     .resume = options.resume,
+                                     .operations = read_operations(options.operations),
+                                     .player = player_options(options.how, options.program)},
                                     transport, live);
   progress.clear();
   std::vector<std::string> struck = modules.struck();
   struck.insert(struck.end(), result.struck.begin(), result.struck.end());
   warn(never_struck(faults, struck));
+  warn_not_operated(result.never_operated);
   if (session.summary()) std::cout << to_text(*session.summary());
   return result.exit_code();
 }
@@ -360,6 +372,13 @@ int run_processes(const RunOptions& options, const BusFaults& faults, const RunF
   std::vector<std::string> mains{"--on-power-return", options.on_power_return};
   if (start.folder) mains = with(mains, {"--memory", start.folder->path()});
   if (options.resume) mains.push_back("--resume");
+  if (options.how.block_delete) mains.push_back("--block-delete");
+  if (options.how.from_line > 0)
+    mains = with(mains, {"--from-line", std::to_string(options.how.from_line)});
+  if (!options.how.tools.empty())
+    mains = with(mains, {"--tools", fs::absolute(options.how.tools).string(), "--tools-unit",
+                         options.how.tools_unit});
+  for (const std::string& text : options.operations) mains = with(mains, {"--operate", text});
   launcher.start("NC unit",
                  with({program_directory() + "/vcnc-nc", "--machine", folder.machine_file(),
                        "--program", fs::absolute(options.program).string(), "--bus", bus, "--pace",
@@ -386,10 +405,19 @@ int run_processes(const RunOptions& options, const BusFaults& faults, const RunF
 }  // namespace
 
 int run_command(RunOptions options) {
-  const Machine machine = load_machine(options.machine, options.assignments, options.injections);
+  const Machine machine =
+      with_program_path(load_machine(options.machine, options.assignments, options.injections),
+                        options.how.program_path);
+  options.how.memory = options.memory;
+  options.how.resumed = options.resume;
   const std::unique_ptr<PieceParams> piece = piece_of(machine);
   // Refuses a wrong program before anything is started or written.
-  Player player(options.program, as_nc_believes(machine));
+  const PlayerOptions how = player_options(options.how, options.program);
+  options.how.from_line = how.from_line;
+  options.how.from_block.clear();
+  Player player(options.program, as_nc_believes(machine), how);
+  if (how.from_line > 0) std::cout << text_of_begin(player) << '\n';
+  options.operations = texts_of(read_operations(options.operations));
   if (options.random_faults > 0)
     for (std::string& fault : drawn_faults(options, player)) {
       std::cerr << "vcnc: --fault \"" << fault << "\"\n";
@@ -406,6 +434,7 @@ int run_command(RunOptions options) {
   try {
     folder.write_inputs(machine, piece.get());
     folder.write_faults(options.faults);
+    folder.write_operations(options.operations);
     const int code = in_process
                          ? run_in_process(options, machine, piece.get(), faults, folder, start)
                          : run_processes(options, faults, folder, start);

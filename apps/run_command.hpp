@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/program_options.hpp"
+
 namespace vcnc {
 
 struct RunOptions {
@@ -23,6 +25,8 @@ struct RunOptions {
   bool in_process = false;
   bool csv = false;
   bool report = true;
+  std::vector<std::string> operations;  ///< --operate, see apps/operations.hpp
+  ProgramChoice how;                    ///< where the program begins, what it skips, its tools
   std::string memory;  ///< folder of what the machine keeps while it is off; empty: none
   std::string on_power_return = "end";
   bool resume = false;  ///< go on with the program that was interrupted

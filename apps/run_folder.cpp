@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::array kFiles{"machine.toml", "piece.toml",    "recording.h5", "recording.h5.partial",
                             "summary.json", "summary.txt",   "report.html",  "rows.csv",
-                            "program.ngc",  "scenario.toml", "notes.txt",    "faults.txt"};
+                            "program.ngc",  "scenario.toml", "notes.txt",    "faults.txt",
+                            "operate.txt"};
 
 /// First line of the machine file that a run leaves: the folder is ours.
 const std::string kMark = "# Written by vcnc run: the machine as it was run.\n";
@@ -83,6 +84,10 @@ void RunFolder::write_notes(const std::vector<std::string>& notes) const {
 
 void RunFolder::write_faults(const std::vector<std::string>& faults) const {
   write_lines(path_ / "faults.txt", faults);
+}
+
+void RunFolder::write_operations(const std::vector<std::string>& operations) const {
+  write_lines(path_ / "operate.txt", operations);
 }
 
 bool RunFolder::has_recording() const {

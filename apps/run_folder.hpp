@@ -27,6 +27,9 @@ class RunFolder {
   /// faults.txt, a line each; no file without faults.
   void write_faults(const std::vector<std::string>& faults) const;
 
+  /// operate.txt, a line each; no file without operations.
+  void write_operations(const std::vector<std::string>& operations) const;
+
   const std::filesystem::path& path() const { return path_; }
   std::string machine_file() const { return (path_ / "machine.toml").string(); }
   std::string piece_file() const { return (path_ / "piece.toml").string(); }

@@ -24,7 +24,7 @@
 
 namespace vcnc {
 
-inline constexpr std::size_t kLargestState = 64 * 1024;
+inline constexpr std::size_t kLargestState = 256 * 1024;
 
 struct MemorySlot {
   std::uint64_t sequence = 0;

@@ -14,6 +14,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "configs/compensation_file.hpp"
+#include "configs/import_map.hpp"
 #include "configs/scenario.hpp"
 #include "configs/spelling.hpp"
 #include "model/parameters.hpp"
@@ -138,6 +140,13 @@ class Reader {
     inner.refuse_unknown_keys();
   }
 
+  /// Where the keys of this table stand, for checks that need more than one of them.
+  void lines(KeyLines& where) const {
+    where[""] = static_cast<int>(table_.source().begin.line);
+    for (const auto& [key, node] : table_)
+      where[std::string(key.str())] = static_cast<int>(node.source().begin.line);
+  }
+
   void refuse_unknown_keys() const {
     for (const auto& [key, node] : table_) {
       if (known_.contains(std::string(key.str()))) continue;
@@ -248,14 +257,15 @@ toml::table parse(std::string_view text, const std::string& name) {
   }
 }
 
-std::string read_file(const std::string& path) {
+std::string read_file(const std::string& path, const char* kind = "TOML file") {
   std::error_code error;
   if (fs::is_directory(path, error))
-    throw ConfigError(path + ": is a directory, expected a TOML file");
+    throw ConfigError(fmt::format("{}: is a directory, expected a {}", path, kind));
   if (fs::exists(path, error) && !fs::is_regular_file(path, error))
-    throw ConfigError(path + ": is not a regular file, expected a TOML file");
+    throw ConfigError(fmt::format("{}: is not a regular file, expected a {}", path, kind));
   if (fs::exists(path, error) && fs::file_size(path, error) > kLargestFile)
-    throw ConfigError(path + ": is larger than 4 MB, too large for a TOML file of ours");
+    throw ConfigError(
+        fmt::format("{}: is larger than 4 MB, too large for a {} of ours", path, kind));
   std::ifstream in(path, std::ios::binary);
   if (!in) throw ConfigError(path + ": cannot be opened");
   std::ostringstream text;
@@ -336,6 +346,8 @@ void check_written(const Machine& m, const std::string& name) {
   if (m.probe.adc_bits != 12 && m.probe.adc_bits != 16)
     throw ConfigError(fmt::format("{}: probe.adc_bits: {} is not possible, allowed 12 or 16", name,
                                   m.probe.adc_bits));
+  if (const std::string objection = m.nc.compensation.objection(m.axes); !objection.empty())
+    throw ConfigError(fmt::format("{}: nc.compensation.{}", name, objection));
   if (m.setup.predeflection >= m.probe.range)
     throw ConfigError(
         fmt::format("{}: setup.predeflection_mm: {:g} must be below probe.range_mm, {:g}", name,
@@ -482,6 +494,35 @@ void refuse_doubles(const std::vector<std::string>& assignments,
   }
 }
 
+/// Folders separated by ':', each as an absolute path.
+std::string absolute_folders(const std::string& folders, const fs::path& base) {
+  std::string absolute;
+  for (std::size_t from = 0; from < folders.size();) {
+    const std::size_t end = std::min(folders.find(':', from), folders.size());
+    if (end > from) {
+      const fs::path folder = (base / folders.substr(from, end - from)).lexically_normal();
+      if (!absolute.empty()) absolute += ':';
+      absolute += folder.string();
+    }
+    from = end + 1;
+  }
+  return absolute;
+}
+
+}  // namespace
+
+namespace {
+
+/// Tables that stand in a file of their own, relative to the machine file.
+void load_tables(Machine& machine, const std::string& path) {
+  for (CompensationTable& table : machine.nc.compensation.tables) {
+    if (table.file.empty() || !table.at.empty()) continue;
+    const std::string file = (fs::path(path).parent_path() / table.file).string();
+    parse_compensation_points(read_file(file, "file of compensation points"), file, table);
+    table.file.clear();
+  }
+}
+
 }  // namespace
 
 Machine load_machine(const std::string& path, const std::vector<std::string>& assignments,
@@ -489,14 +530,17 @@ Machine load_machine(const std::string& path, const std::vector<std::string>& as
   toml::table table = parse(read_file(path), path);
   const toml::node* file_piece = table["setup"]["piece"].node();
   fs::path base = file_piece ? fs::absolute(path).parent_path() : fs::current_path();
+  fs::path program_base = fs::absolute(path).parent_path();
   for (const std::string& assignment : assignments) {
     toml::table one = parse_assignment(assignment);
     if (one["setup"]["piece"].node()) base = fs::current_path();
+    if (one["nc"]["program_path"].node()) program_base = fs::current_path();
     merge(table, std::move(one));
   }
   refuse_doubles(assignments, injections);
   for (const std::string& injection : injections) inject(table, injection);
   Machine machine = read<Machine>(table);
+  load_tables(machine, path);
   check_whole(machine, path);
   if (!machine.setup.piece.empty()) {
     std::error_code error;
@@ -506,6 +550,7 @@ Machine load_machine(const std::string& path, const std::vector<std::string>& as
           fmt::format("{}: setup.piece: {}: {}", path, machine.setup.piece, error.message()));
     machine.setup.piece = piece.string();
   }
+  machine.nc.program_path = absolute_folders(machine.nc.program_path, program_base);
   return machine;
 }
 
@@ -520,6 +565,19 @@ PieceParams load_piece(const std::string& path) { return parse_piece(read_file(p
 
 PieceParams parse_piece(std::string_view toml, const std::string& name) {
   return read<PieceParams>(parse(toml, name));
+}
+
+ImportMap parse_import_map(std::string_view toml, const std::string& name) {
+  const ImportMap map = read<ImportMap>(parse(toml, name));
+  check_import_map(map, name);
+  return map;
+}
+
+ImportMap load_import_map(const std::string& path) {
+  ImportMap map = parse_import_map(read_file(path), path);
+  if (!map.machine.empty())
+    map.machine = fs::weakly_canonical(fs::absolute(path).parent_path() / map.machine).string();
+  return map;
 }
 
 Scenario parse_scenario(std::string_view toml, const std::string& name) {

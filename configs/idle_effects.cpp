@@ -12,11 +12,12 @@ void look_at_axis(const Machine& machine, std::size_t axis, std::vector<std::str
   const auto say = [&](const auto& effect, const char* why) {
     idle.push_back(fmt::format("effects.{}.{}: {}", kAxisNames[axis], effect.text.name, why));
   };
-  const bool dry = !e.get<Coulomb>().null() || !e.get<Stribeck>().null();
+  const bool dry =
+      !e.get<Coulomb>().null() || !e.get<Stribeck>().null() || !e.get<GreaseDrag>().null();
   const bool viscous = !e.get<Viscous>().null() || !e.get<NonlinearViscous>().null();
   const auto needs_dry = [&](const auto& effect) {
     if (!effect.null() && !dry)
-      say(effect, "does nothing, the axis has no dry friction (coulomb, stribeck)");
+      say(effect, "does nothing, the axis has no dry friction (coulomb, stribeck, grease_drag)");
   };
   needs_dry(e.get<Presliding>());
   needs_dry(e.get<FrictionZone>());

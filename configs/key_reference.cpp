@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "configs/config.hpp"
+#include "configs/import_map.hpp"
 #include "configs/scenario.hpp"
 #include "configs/toml_writer.hpp"
 
@@ -100,6 +101,7 @@ std::string machine_key_reference() {
          "belong to what it depends on and where it acts, see there.\n";
 }
 std::string piece_key_reference() { return reference_of<PieceParams>(); }
+std::string import_map_key_reference() { return reference_of<ImportMap>(); }
 std::string scenario_key_reference() { return reference_of<Scenario>(); }
 
 }  // namespace vcnc

@@ -105,6 +105,9 @@ constexpr std::array kTexts{
     AlarmText{AlarmCode::resumed, "An interrupted program goes on",
               "the mains came back with --on-power-return resume, or the run began with --resume",
               "none; this run or the one before holds the other part of the path"},
+    AlarmText{AlarmCode::program_refused, "The program cannot go on",
+              "block delete was switched while it ran, and the blocks that come now do not fit",
+              "look at the line named; check the program with and without --block-delete"},
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 //   2xxx  drives
 //   3xxx  bus and modules
 //   4xxx  mains and supply
+//   5xxx  program and operator
 #pragma once
 
 #include <cstdint>
@@ -37,6 +38,7 @@ enum class AlarmCode {
   supply_exhausted = 4003,
   secured = 4004,
   resumed = 4005,
+  program_refused = 5001,
 };
 
 struct AlarmText {

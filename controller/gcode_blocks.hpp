@@ -65,8 +65,13 @@ struct Move {
   double feed = 0;       ///< tip [m/s], rotary [rad/s], time [s] for the whole move
   bool exact = false;    ///< G61
   double tolerance = 0;  ///< G64: of the controlled point [m]
-  bool alone = false;    ///< begins and ends at rest (G28, G53, probing)
-  bool probe = false;    ///< G31, G38: would end where the probe touches
+  NcParams::Dynamics dynamics = NcParams::Dynamics::smooth;
+  bool alone = false;  ///< begins and ends at rest (G28, G53, probing)
+  bool probe = false;  ///< G31, G38: would end where the probe touches
+  /// What the operator's overrides may do: `fixed` runs at 100 % (M49, probing), `locked` cannot be
+  /// held before its end either (threads).
+  enum class Panel { acts, fixed, locked };
+  Panel panel = Panel::acts;
   /// Feed as the program gives it where that is not per minute: [m] per turn of the spindle (G95).
   double feed_per_turn = 0;
   int line = 0;
@@ -84,10 +89,11 @@ struct SpindleWord {
   int line = 0;
 };
 
-/// M0 (waits) and M1 (the switch is off: only brings the axes to rest).
+/// M0 (waits), M1 (waits where the switch for it is on) and M6, all with the axes at rest.
 struct ProgramStop {
-  bool optional = false;
+  bool optional = false;  ///< M1, M6
   int line = 0;
+  bool tool_change = false;  ///< M6
 };
 
 struct ProgramEnd {

@@ -3,10 +3,9 @@
 #include <xxhash.h>
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
 
 #include "controller/retract.hpp"
+#include "controller/state_bytes.hpp"
 
 namespace vcnc {
 
@@ -15,62 +14,10 @@ namespace {
 constexpr std::uint64_t kVersion = 1;
 constexpr std::size_t kLongestPath = 4096;
 
-class Writer {
- public:
-  void number(std::uint64_t value, int count) {
-    for (int i = 0; i < count; ++i) bytes_.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
-  }
-  void real(double value) { number(std::bit_cast<std::uint64_t>(value), 8); }
-  template <class Range>
-  void bytes(const Range& range) {
-    bytes_.insert(bytes_.end(), range.begin(), range.end());
-  }
-  std::vector<std::uint8_t> take() { return std::move(bytes_); }
-
- private:
-  std::vector<std::uint8_t> bytes_;
-};
-
-/// Reads until something does not fit; from then on everything is zero and bad() says so.
-class Reader {
- public:
-  explicit Reader(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
-
-  std::span<const std::uint8_t> take(std::size_t count) {
-    bad_ = bad_ || count > rest_.size();
-    if (bad_) return {};
-    const auto taken = rest_.first(count);
-    rest_ = rest_.subspan(count);
-    return taken;
-  }
-  std::uint64_t number(std::size_t count) {
-    const auto bytes = take(count);
-    std::uint64_t value = 0;
-    for (std::size_t i = bytes.size(); i > 0; --i) value = value << 8 | bytes[i - 1];
-    return value;
-  }
-  double real() {
-    const double value = std::bit_cast<double>(number(8));
-    bad_ = bad_ || !std::isfinite(value);
-    return value;
-  }
-  template <class Enum>
-  Enum one_of(Enum last) {
-    const std::uint64_t value = number(1);
-    bad_ = bad_ || value > static_cast<std::uint64_t>(last);
-    return static_cast<Enum>(value);
-  }
-  void hash(ContentHash& hash) {
-    const auto bytes = take(hash.size());
-    std::copy(bytes.begin(), bytes.end(), hash.begin());
-  }
-  void require(bool holds) { bad_ = bad_ || !holds; }
-  bool whole() const { return !bad_ && rest_.empty(); }
-
- private:
-  std::span<const std::uint8_t> rest_;
-  bool bad_ = false;
-};
+void take_hash(StateReader& in, ContentHash& hash) {
+  const auto bytes = in.take(hash.size());
+  std::copy(bytes.begin(), bytes.end(), hash.begin());
+}
 
 }  // namespace
 
@@ -83,7 +30,7 @@ ContentHash hash_of(std::string_view content) {
 }
 
 std::vector<std::uint8_t> encode_record(const NcRecord& r) {
-  Writer out;
+  StateWriter out;
   out.number(kVersion, 1);
   out.number(static_cast<std::uint64_t>(r.stage), 1);
   out.number(static_cast<std::uint64_t>(r.protection.state), 1);
@@ -105,7 +52,7 @@ std::vector<std::uint8_t> encode_record(const NcRecord& r) {
 }
 
 std::optional<NcRecord> decode_record(std::span<const std::uint8_t> bytes) {
-  Reader in(bytes);
+  StateReader in(bytes);
   NcRecord r;
   in.require(in.number(1) == kVersion);
   r.stage = in.one_of(RunStage::done);
@@ -114,8 +61,8 @@ std::optional<NcRecord> decode_record(std::span<const std::uint8_t> bytes) {
   r.alarm = static_cast<int>(in.number(4));
   in.require(r.alarm >= 0);
   r.cycle = static_cast<Tick>(in.number(8));
-  in.hash(r.program_hash);
-  in.hash(r.machine_hash);
+  take_hash(in, r.program_hash);
+  take_hash(in, r.machine_hash);
   r.held.cycles = static_cast<Tick>(in.number(8));
   in.require(r.cycle >= 0 && r.held.cycles >= 0);
   r.held.on_path = in.real();

@@ -17,6 +17,7 @@ constexpr Tick kSettleCycles = 100;   ///< after the last set-point, before the 
 constexpr Tick kStopCycles = 5000;    ///< at most this long for a stop in an alarm
 constexpr int kSilentCyclesBearable = 2;
 constexpr Tick kRememberCycles = 20;  ///< between two records while the axes are being secured
+constexpr Tick kDataCycles = 1000;    ///< between two records of offsets, parameters and tools
 
 cia402::State drive_state(const DriveStatus& status) { return cia402::state_of(status.statusword); }
 
@@ -53,14 +54,19 @@ NcUnit::NcUnit(const Machine& machine, const std::string& program, TelemetrySink
                const NcUnitOptions& options)
     : machine_(machine),
       protection_(machine.probe),
-      player_(program, machine),
+      player_(program, machine, options.player),
+      panel_(options.operations),
       shaping_(machine_chain<InterpolationPort>(machine.effects, kNoSeed)),
+      compensation_(machine),
+      compensating_(compensation_),
       sink_(sink),
       heartbeat_period_(heartbeat_cycles(machine.bus.heartbeat_time)),
       outage_(machine_, player_),
       options_(options),
       saved_(options.record) {
   protection_.restore(saved_.protection);
+  if (!options_.resume) options_.kept.begin = options_.player.interpreter.data;
+  if (options_.data) options_.data->save(encode_nc_data(options_.kept));
   if (options_.resume) seek();
   for (HeartbeatWatch& watch : heartbeats_) {
     watch.set_time(kHeartbeatPatience * heartbeat_period_);
@@ -101,7 +107,13 @@ void NcUnit::seek() {
 bool NcUnit::step(Tick k, std::span<const Frame> answers, Frames& out) {
   latch(k, answers);
   supervise(k);
-  advance(k);
+  operate(k);
+  try {
+    advance(k);
+  } catch (const ProgramError& error) {
+    raise(k, AlarmCode::program_refused, "NC unit", error.what(), Stop::hold);
+    planned_.state = state_;
+  }
   command(k, out);
   sample(k);
   remember(k);
@@ -318,14 +330,28 @@ void NcUnit::tell(Tick k, AlarmCode code, const std::string& detail) {
   sink_.alarm({k, static_cast<int>(code), "NC unit", std::move(text)});
 }
 
+/// What the operator does at the panel in this cycle.
+void NcUnit::operate(Tick k) {
+  if (panel_.empty() || state_ == NcState::alarm || state_ == NcState::done) return;
+  for (const Operation& operation : panel_.due(k, planned_.step.line)) {
+    if (operation.kind == Operation::Kind::hold) player_.feed_hold();
+    if (operation.kind == Operation::Kind::start) player_.cycle_start();
+  }
+  player_.operate(panel_.switches());
+  player_.attended(panel_.start_to_come());
+}
+
 void NcUnit::watch_mains(Tick k) {
   if (mains_failing_ != mains_told_) {
-    const bool playing = state_ == NcState::running || state_ == NcState::dwell;
+    const bool playing = state_ == NcState::running || state_ == NcState::dwell ||
+                         (state_ == NcState::hold && !outage_.active());
     tell(k, mains_failing_ ? AlarmCode::mains_lost : AlarmCode::mains_back,
          mains_failing_ && playing ? "feed hold" : "");
     mains_told_ = mains_failing_;
   }
-  if (!mains_failing_ || (state_ != NcState::running && state_ != NcState::dwell)) return;
+  if (!mains_failing_ || (state_ != NcState::running && state_ != NcState::dwell &&
+                          (state_ != NcState::hold || outage_.active())))
+    return;
   if (!outage_.active() || outage_.phase() == Outage::Phase::rising) outage_.begin();
 }
 
@@ -370,10 +396,20 @@ RunStage NcUnit::stage() const {
   return RunStage::returning;
 }
 
+/// Offsets, parameters and tools where a program has changed them.
+void NcUnit::remember_data(Tick k, bool now) {
+  if (options_.data == nullptr || (!now && k - data_saved_at_ < kDataCycles)) return;
+  data_saved_at_ = k;
+  if (player_.data() == options_.kept.now) return;
+  options_.kept.now = player_.data();
+  options_.data->save(encode_nc_data(options_.kept));
+}
+
 /// Writes the record where there is something new to keep.
 void NcUnit::remember(Tick k) {
   if (options_.memory == nullptr) return;
   const RunStage now = stage();
+  remember_data(k, now != saved_.stage);
   const ProtectionLatch latch = protection_.latch();
   const bool moving = outage_.active() && outage_.phase() != Outage::Phase::waiting &&
                       now != RunStage::alarm && state_ != NcState::starting;
@@ -412,12 +448,20 @@ void NcUnit::advance(Tick k) {
     shape(k);
   } else if (outage_.active() && state_ != NcState::alarm) {
     ride_out(k);
-  } else if (state_ == NcState::running || state_ == NcState::dwell) {
+  } else if (state_ == NcState::running || state_ == NcState::dwell || state_ == NcState::hold) {
     planned_.step = player_.step();
     shape(k);
-    state_ = planned_.step.done    ? NcState::done
-             : planned_.step.dwell ? NcState::dwell
-                                   : NcState::running;
+    const bool at_zero = player_.stands_at_zero();
+    state_ = planned_.step.done             ? NcState::done
+             : player_.waiting() || at_zero ? NcState::hold
+             : planned_.step.dwell          ? NcState::dwell
+                                            : NcState::running;
+    at_zero_ = at_zero ? at_zero_ + 1 : 0;
+    if (ending_since_ < 0 && seconds(at_zero_) > kProgramStopSeconds && !panel_.timed_to_come()) {
+      ending_since_ = k;
+      reason_ = fmt::format("stands on line {} at an override of 0 %, and nothing more is operated",
+                            planned_.step.line);
+    }
     if (state_ == NcState::done) {
       ending_since_ = k;
       reason_ = "program end";
@@ -476,8 +520,12 @@ void NcUnit::command(Tick k, Frames& out) {
       command.controlword = cia402::kEnable;
       break;
   }
+  Compensated sent{planned_.step.position, planned_.step.velocity, {}};
+  if (!compensation_.empty() && state_ != NcState::starting)
+    sent = compensated(compensation_, sent.position, sent.velocity, compensating_);
+  planned_.correction = sent.correction;
   for (std::size_t i = 0; i < kAxisCount; ++i)
-    command.axes[i] = {planned_.step.position[i], planned_.step.velocity[i]};
+    command.axes[i] = {sent.position[i], sent.velocity[i]};
   command.spindle_mode = static_cast<GroupCommand::SpindleMode>(planned_.step.spindle);
   command.spindle_speed = planned_.step.spindle_speed;
   if (alarmed_) command.flags |= kSpindleLock;
@@ -495,7 +543,7 @@ void NcUnit::sample(Tick k) {
   row.feed = commanded.step.feed;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     row.q_cmd[i] = commanded.step.position[i];
-    row.q_act[i] = measured_[i].position;
+    row.q_act[i] = measured_[i].position - commanded.correction[i];
     row.q_second[i] = measured_[i].second_encoder;
     row.force[i] = measured_[i].force;
   }

@@ -6,10 +6,12 @@
 //   supervise  stops on a faulty drive and on the overtravel protection: the module's, and - a
 //              second path, independent of it - the NC unit's own on the same samples
 //   advance    one interpolator cycle: the set-points for t_k+2; program, feed hold or retraction
-//   command    sends them; the drives act on them in cycle k+1
+//   command    sends them, compensated (controller/compensation.hpp); the drives act on them in
+//              cycle k+1
 //   sample     hands out the telemetry row of instant t_k: command, measured position and
 //              deflection of that same instant (commanded in cycle k-2, measured in k-1, digitised
-//              in k)
+//              in k). Positions are those of the program: what the compensation of errors adds is
+//              taken off the measured ones again
 //
 // A soft stop (SOFT_STOP, see model/safety/protection.hpp) holds the feed on the path, then
 // retracts the probe (retract.hpp) with the drives in operation; a quick stop leaves braking to the
@@ -38,7 +40,9 @@
 #include "bus/node_memory.hpp"
 #include "bus/telemetry.hpp"
 #include "controller/alarms.hpp"
+#include "controller/compensation.hpp"
 #include "controller/nc_record.hpp"
+#include "controller/operation.hpp"
 #include "controller/outage.hpp"
 #include "controller/player.hpp"
 #include "controller/retract.hpp"
@@ -53,10 +57,14 @@ enum class OnPowerReturn { end, resume };
 
 struct NcUnitOptions {
   OnPowerReturn on_power_return = OnPowerReturn::end;
-  NodeMemory* memory = nullptr;  ///< outlives the unit; null: nothing is kept
-  NcRecord record{};             ///< what was kept; program, hashes and latch go on in it
-  bool resume = false;           ///< go on where the record says, axes standing at ...
-  AxisVector switched_on_at{};   ///< ... these positions
+  NodeMemory* memory = nullptr;         ///< outlives the unit; null: nothing is kept
+  NodeMemory* data = nullptr;           ///< the same, of offsets, parameters and tools
+  KeptNcData kept{};                    ///< what it holds
+  NcRecord record{};                    ///< what was kept; program, hashes and latch go on in it
+  bool resume = false;                  ///< go on where the record says, axes standing at ...
+  AxisVector switched_on_at{};          ///< ... these positions
+  std::vector<Operation> operations{};  ///< what the operator does at the panel
+  PlayerOptions player{};
 };
 
 class NcUnit : public Master {
@@ -79,12 +87,15 @@ class NcUnit : public Master {
   const std::string& reason() const { return reason_; }  ///< why it ended, for people
   bool alarmed() const { return alarmed_ || ended_by_mains_; }
   RunStage stage() const;  ///< of the program, as it is kept
+  /// What the operator has had no occasion to do, as it was written.
+  std::vector<std::string> never_operated() const { return panel_.never(); }
 
  private:
   /// Everything commanded for one instant.
   struct Commanded {
     PlayerStep step;
     NcState state = NcState::starting;
+    AxisVector correction{};  ///< of it, for the errors of the machine
   };
   /// How the machine comes to rest after an alarm.
   enum class Stop { none, hold, retract, quick };
@@ -100,8 +111,10 @@ class NcUnit : public Master {
   void watch_mains(Tick k);
   void ride_out(Tick k);
   void seek();
+  void operate(Tick k);
   void tell(Tick k, AlarmCode code, const std::string& detail);
   void remember(Tick k);
+  void remember_data(Tick k, bool now);
   void advance(Tick k);
   void shape(Tick k);
   void stop_softly(Tick k);
@@ -116,7 +129,11 @@ class NcUnit : public Master {
   Machine machine_;
   Protection protection_;  ///< the NC unit's own
   Player player_;
+  OperatorPanel panel_;
+  Tick at_zero_ = 0;                  ///< cycles at an override of 0 %
   Chain<InterpolationPort> shaping_;  ///< of the set-points
+  CompensationRules compensation_;
+  CompensationState compensating_;
   TelemetrySink& sink_;
   Tick heartbeat_period_;  ///< own, and of every module
 
@@ -128,7 +145,7 @@ class NcUnit : public Master {
   Outage outage_;
   NcUnitOptions options_;
   NcRecord saved_;  ///< what the memory holds
-  Tick saved_at_ = 0;
+  Tick saved_at_ = 0, data_saved_at_ = 0;
   std::optional<Retract> retract_;
   Tick retracting_since_ = 0;
   std::string reason_ = "interrupted";

@@ -10,7 +10,9 @@ namespace {
 constexpr double kExactTolerance = 5e-7;  ///< G61 at joints that are (nearly) tangent [m]
 constexpr double kLargestArcStep = 0.5;   ///< angle integrated at once [rad]
 constexpr double kKnotStep = 4;           ///< distance of the knots of h(s), in h
-constexpr double kSmallestSine = 0.05;    ///< near the pole C does not turn the tool axis
+/// How far a width has an influence: the hat itself and the slope down from the widest.
+constexpr double kReach = Path::kLargestWidth * (2 + 1 / Path::kWidthSlope);
+constexpr double kSmallestSine = 0.05;  ///< near the pole C does not turn the tool axis
 
 /// Gauss-Legendre points on [-1, 1].
 struct GaussPoint {
@@ -92,8 +94,29 @@ PathPoint programmed_point(const PathSegment& segment, double s) {
   return {segment.move.start + share * d, d / segment.length};
 }
 
-Path::Path(std::vector<Move> moves, double angle_tolerance) : angle_tolerance_(angle_tolerance) {
-  segments_.reserve(moves.size());
+Path::Path(std::vector<Move> moves, double angle_tolerance, bool open)
+    : angle_tolerance_(angle_tolerance), open_(open) {
+  append(std::move(moves));
+}
+
+void Path::extend(std::vector<Move> moves, bool open) {
+  open_ = open;
+  append(std::move(moves));
+}
+
+void Path::forget(double s) {
+  const double from = std::min(s, settled_) - kReach;
+  const auto before = [from](const Bound& b) { return b.s < from; };
+  segments_.erase(segments_.begin(), segments_.begin() + static_cast<std::ptrdiff_t>(index(from)));
+  // One of each stays before the place.
+  for (std::vector<Bound>* list : {&bounds_, &knots_}) {
+    const auto keep = std::partition_point(list->begin(), list->end(), before);
+    if (keep - list->begin() > 1) list->erase(list->begin(), keep - 1);
+  }
+}
+
+void Path::append(std::vector<Move> moves) {
+  segments_.reserve(segments_.size() + moves.size());
   for (Move& move : moves) {
     PathSegment segment = make_segment(std::move(move), length_);
     if (segment.length < 1e-12) {
@@ -104,7 +127,9 @@ Path::Path(std::vector<Move> moves, double angle_tolerance) : angle_tolerance_(a
     length_ += segment.length;
     segments_.push_back(std::move(segment));
   }
-  if (!segments_.empty()) build_width(width_bounds());
+  if (segments_.empty()) return;
+  bound_width();
+  build_width();
 }
 
 std::size_t Path::index(double s) const {
@@ -241,16 +266,24 @@ double Path::largest_width(double s, double from, double cap) const {
   return good;
 }
 
-std::vector<Path::Bound> Path::width_bounds() const {
-  std::vector<Bound> bounds;
-  bounds.reserve(2 * segments_.size() + 2);
-  double last = std::min(kLargestWidth, length_);
-  bounds.push_back({0, last});
-  for (const PathSegment& segment : segments_) {
-    if (segment.s0 > 0) bounds.push_back({segment.s0, last = largest_width(segment.s0, last)});
+void Path::bound_width() {
+  // Bounds that moves which follow could change are found anew.
+  std::size_t first = 0;
+  if (settled_ == 0) {
+    knots_.clear();
+    bounds_ = {{0, std::min(kLargestWidth, length_)}};
+  } else {
+    first = index(settled_);
+    const double from = segments_[first].s0;
+    std::erase_if(bounds_, [&](const Bound& b) { return b.s > 0 && b.s >= from; });
+  }
+  double last = bounds_.back().h;
+  for (std::size_t k = first; k < segments_.size(); ++k) {
+    const PathSegment& segment = segments_[k];
+    if (segment.s0 > 0) bounds_.push_back({segment.s0, last = largest_width(segment.s0, last)});
     if (segment.move.kind != Move::Kind::arc) {
       const double s = segment.s0 + 0.5 * segment.length;
-      bounds.push_back({s, last = largest_width(s, last)});
+      bounds_.push_back({s, last = largest_width(s, last)});
       continue;
     }
     // Arcs have their own cap, everywhere: samples no further apart than the envelope can climb.
@@ -260,16 +293,15 @@ std::vector<Path::Bound> Path::width_bounds() const {
     const auto samples = static_cast<int>(std::ceil(segment.length / cap));
     for (int i = 0; i < samples; ++i) {
       const double s = segment.s0 + segment.length * (i + 0.5) / samples;
-      bounds.push_back({s, last = largest_width(s, cap, cap)});
+      bounds_.push_back({s, last = largest_width(s, cap, cap)});
     }
   }
-  bounds.push_back({length_, std::min(kLargestWidth, length_)});
-  return bounds;
+  bounds_.push_back({length_, std::min(kLargestWidth, length_)});
 }
 
 /// Lower envelope with slope kWidthSlope, then knots at distances of kKnotStep h.
-void Path::build_width(const std::vector<Bound>& bounds) {
-  std::vector<Bound> envelope = bounds;
+void Path::build_width() {
+  std::vector<Bound> envelope = bounds_;
   for (std::size_t i = 1; i < envelope.size(); ++i)
     envelope[i].h = std::min(envelope[i].h,
                              envelope[i - 1].h + kWidthSlope * (envelope[i].s - envelope[i - 1].s));
@@ -284,14 +316,24 @@ void Path::build_width(const std::vector<Bound>& bounds) {
     const Bound& left = *(next - 1);
     return std::min(left.h + kWidthSlope * (s - left.s), right.h + kWidthSlope * (right.s - s));
   };
-  std::vector<double> at{0};
+  // Of an open path the knots up to the settled one stay.
+  const std::size_t kept = static_cast<std::size_t>(
+      std::partition_point(knots_.begin(), knots_.end(),
+                           [&](const Bound& b) { return b.s <= settled_; }) -
+      knots_.begin());
+  knots_.resize(kept, Bound{});
+  std::vector<double> at;
+  for (std::size_t k = kept - std::min<std::size_t>(kept, 2); k < kept; ++k)
+    at.push_back(knots_[k].s);
+  if (at.empty()) at.push_back(0);
+  const std::size_t known = kept > 0 ? at.size() : 0;
   while (at.back() < length_) {
     const double s = at.back();
     at.push_back(std::min(length_, s + kKnotStep * envelope_at(s)));
   }
   // Each knot takes the least bound between its neighbours, so the steps between them stay below.
   std::size_t first = 0;
-  for (std::size_t k = 0; k < at.size(); ++k) {
+  for (std::size_t k = known; k < at.size(); ++k) {
     const double from = at[k > 0 ? k - 1 : 0], to = at[std::min(k + 1, at.size() - 1)];
     double h = std::min(envelope_at(from), envelope_at(to));
     while (first < envelope.size() && envelope[first].s < from) ++first;
@@ -299,6 +341,11 @@ void Path::build_width(const std::vector<Bound>& bounds) {
       h = std::min(h, envelope[i].h);
     knots_.push_back({at[k], h});
   }
+  settled_ = length_;
+  if (!open_) return;
+  const auto end = std::partition_point(knots_.begin(), knots_.end(),
+                                        [&](const Bound& b) { return b.s <= length_ - kReach; });
+  settled_ = end - knots_.begin() > 2 ? (end - 2)->s : 0;
 }
 
 Path::Width Path::width(double s) const {

@@ -46,7 +46,15 @@ class Path {
 
   /// Moves must follow each other without a gap and share one frame. `angle_tolerance` [rad] bounds
   /// the deviation of the tool axis (RTCP) or of A and C.
-  Path(std::vector<Move> moves, double angle_tolerance);
+  /// While a path is open, more moves may follow.
+  Path(std::vector<Move> moves, double angle_tolerance, bool open = false);
+
+  void extend(std::vector<Move> moves, bool open);
+  /// Up to here moves that follow change nothing.
+  double settled() const { return settled_; }
+  bool open() const { return open_; }
+  /// The path before s is not asked for any more.
+  void forget(double s);
 
   double length() const { return length_; }
   PathPoint eval(double s) const;        ///< the smooth curve; s is clamped to [0, length]
@@ -69,13 +77,17 @@ class Path {
   PathPoint smooth(double s, Width w) const;
   double largest_width(double s, double from, double cap = kLargestWidth) const;
   bool within_tolerance(double s, double h, double tip_tolerance) const;
-  std::vector<Bound> width_bounds() const;
-  void build_width(const std::vector<Bound>& bounds);
+  void append(std::vector<Move> moves);
+  void bound_width();
+  void build_width();
   double tolerance_at(double s) const;
 
   std::vector<PathSegment> segments_;
   double length_ = 0, angle_tolerance_;
-  std::vector<Bound> knots_;  ///< h(s) runs through these
+  std::vector<Bound> bounds_;  ///< largest widths by tolerance
+  std::vector<Bound> knots_;   ///< h(s) runs through these
+  double settled_ = 0;
+  bool open_;
 };
 
 }  // namespace vcnc

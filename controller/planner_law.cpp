@@ -10,6 +10,7 @@ namespace {
 
 /// The averaged position is ahead of or behind the middle of the window where the speed changes.
 constexpr double kReach = 1.1;
+constexpr std::size_t kLastNodes = 8;
 
 /// Each limit v spread over +- v T/2: the least of all that reach a node.
 std::vector<double> spread_limits(const std::vector<LimitNode>& nodes, double window) {
@@ -56,19 +57,57 @@ double reachable(const LimitNode& a, const LimitNode& b, double from, double win
 
 SpeedLaw::SpeedLaw(const std::vector<LimitNode>& nodes, const MotionLimits& limits, double window)
     : window_(window) {
-  std::vector<double> v = spread_limits(nodes, window);
+  knots_.reserve(nodes.size());
+  knots_.push_back({0, nodes.front().s, 0});
+  find(nodes, limits);
+}
+
+SpeedLaw::SpeedLaw(const std::vector<LimitNode>& nodes, const MotionLimits& limits, SpeedLaw before)
+    : knots_(std::move(before.knots_)),
+      first_(before.first_ + before.settled_),
+      window_(before.window_),
+      pace_(before.pace_) {
+  again(nodes, limits);
+}
+
+void SpeedLaw::again(const std::vector<LimitNode>& nodes, const MotionLimits& limits) {
+  knots_.resize(first_ + 1, Knot{});
+  find(nodes, limits);
+}
+
+/// Appends the knots of all nodes to that of the first one.
+void SpeedLaw::find(const std::vector<LimitNode>& nodes, const MotionLimits& limits) {
+  std::vector<double> v = spread_limits(nodes, window_);
   const std::size_t n = nodes.size();
-  v.front() = v.back() = 0;
+  v.front() = knots_.back().v;
+  v.back() = 0;
   for (std::size_t j = 1; j < n; ++j)
-    v[j] = std::min(v[j], reachable(nodes[j - 1], nodes[j], v[j - 1], window, limits));
-  for (std::size_t j = n - 1; j-- > 0;)
-    v[j] = std::min(v[j], reachable(nodes[j + 1], nodes[j], v[j + 1], window, limits));
-  knots_.reserve(n);
-  double t = 0;
-  for (std::size_t j = 0; j < n; ++j) {
-    if (j > 0) t += 2 * (nodes[j].s - nodes[j - 1].s) / (v[j] + v[j - 1]);
+    v[j] = std::min(v[j], reachable(nodes[j - 1], nodes[j], v[j - 1], window_, limits));
+  // What lies before a node that does not brake for the end, does not either. The last nodes may
+  // change, and limits behind the end reach back.
+  const double fastest = *std::max_element(v.begin(), v.end());
+  const double known = nodes.back().s - kReach * 0.5 * fastest * window_;
+  settled_ = n;
+  for (std::size_t j = n - 1; j-- > 0;) {
+    const double least = reachable(nodes[j + 1], nodes[j], v[j + 1], window_, limits);
+    if (settled_ == n && least >= v[j] && nodes[j].s <= known && j + kLastNodes < n) settled_ = j;
+    v[j] = std::min(v[j], least);
+  }
+  if (settled_ == n) settled_ = 0;
+  v.front() = knots_.back().v;
+  knots_.reserve(knots_.size() + n);
+  double t = knots_.back().t;
+  for (std::size_t j = 1; j < n; ++j) {
+    t += 2 * (nodes[j].s - nodes[j - 1].s) / (v[j] + v[j - 1]);
     knots_.push_back({t, nodes[j].s, v[j]});
   }
+}
+
+void SpeedLaw::forget(double t) {
+  const std::size_t old = std::min(index(pace_ * t - window_), first_);
+  if (old == 0) return;
+  knots_.erase(knots_.begin(), knots_.begin() + static_cast<std::ptrdiff_t>(old));
+  first_ -= old;
 }
 
 SpeedLaw SpeedLaw::fastest(const std::vector<LimitNode>& nodes, const MotionLimits& limits) {
@@ -91,22 +130,23 @@ std::size_t SpeedLaw::index(double t) const {
 LawPoint SpeedLaw::raw_in(std::size_t cell, double t) const {
   const Knot &from = knots_[cell], &to = knots_[cell + 1];
   const double a = (to.v - from.v) / (to.t - from.t), dt = t - from.t;
-  return {from.s + dt * (from.v + 0.5 * a * dt), from.v + a * dt};
+  return {from.s + dt * (from.v + 0.5 * a * dt), from.v + a * dt, a};
 }
 
 LawPoint SpeedLaw::raw(double t) const {
-  if (t <= 0) return {0, 0};
-  if (t >= knots_.back().t) return {knots_.back().s, 0};
+  if (t <= 0) return {};
+  if (t >= knots_.back().t) return {knots_.back().s, 0, 0};
   return raw_in(index(t), t);
 }
 
 LawPoint SpeedLaw::at(double t) const {
   t *= pace_;
   const double from = t - window_, end = knots_.back().t, last = knots_.back().s;
-  if (t <= 0) return {0, 0};
-  if (from >= end) return {last, 0};
+  if (t <= 0) return {};
+  if (from >= end) return {last, 0, 0};
   // Integral of s - reference over the window; Simpson's rule is exact in each cell.
-  const double reference = raw(t).s;
+  const LawPoint now = raw(t), before = raw(from);
+  const double reference = now.s;
   double sum = from < 0 ? from * reference : 0;  // before the start s = 0
   if (t > end) sum += (t - end) * (last - reference);
   const double lo = std::max(from, 0.0), hi = std::min(t, end);
@@ -116,7 +156,8 @@ LawPoint SpeedLaw::at(double t) const {
         (b - a) / 6 *
         (raw_in(cell, a).s + 4 * raw_in(cell, 0.5 * (a + b)).s + raw_in(cell, b).s - 6 * reference);
   }
-  return {reference + sum / window_, pace_ * (reference - raw(from).s) / window_};
+  return {reference + sum / window_, pace_ * (reference - before.s) / window_,
+          pace_ * pace_ * (now.ds - before.ds) / window_};
 }
 
 }  // namespace vcnc

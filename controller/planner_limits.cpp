@@ -73,28 +73,32 @@ std::optional<ProbingLimit> probing_limit(const Machine& machine) {
   return ProbingLimit(machine, kReactionCycles * kCycle);
 }
 
+double speed_limit(const Path& path, double s, const Coordinates& dx, const AxisPoint& axes,
+                   const std::optional<ProbingLimit>& probing) {
+  const double feed = feed_limit(path, s, dx);
+  if (!probing) return feed;
+  const bool rapid = path.segment(s).move.kind == Move::Kind::rapid;
+  const double most = probing->at(as_axes(axes.q), as_axes(axes.dq)).factor;
+  return std::min(feed, std::max(kSlowest, (rapid ? kRapidShare : 1) * most));
+}
+
 std::vector<LimitNode> limit_nodes(const Path& path, const FrameMap& map,
                                    const MotionLimits& limits,
-                                   const std::optional<ProbingLimit>& probing) {
-  const double length = path.length();
+                                   const std::optional<ProbingLimit>& probing, double from) {
+  const double length = path.length(), end = path.settled();
   std::vector<LimitNode> nodes;
   std::vector<Coordinates> slope;
-  for (double s = 0;;) {
+  for (double s = from;;) {
     const PathPoint point = path.eval(s);
     const AxisPoint axes = axis_point(map, point);
     slope.push_back(axes.dq);
     LimitNode& node = nodes.emplace_back();
     node.s = s;
-    node.v_max = feed_limit(path, s, point.dx);
-    if (probing) {
-      const bool rapid = path.segment(s).move.kind == Move::Kind::rapid;
-      const double most = probing->at(as_axes(axes.q), as_axes(axes.dq)).factor;
-      node.v_max = std::min(node.v_max, std::max(kSlowest, (rapid ? kRapidShare : 1) * most));
-    }
-    if (s >= length) break;
+    node.v_max = speed_limit(path, s, point.dx, axes, probing);
+    if (s >= end) break;
     const double step =
         std::min({path.half_width(s) / kStepsPerWidth, kLargestStep, length / kFewestSteps});
-    s = length - s < 1.5 * step ? length : s + step;
+    s = end - s < 1.5 * step ? end : s + step;
   }
 
   // Second and third derivatives by differences of the exact first one; each node then takes the
@@ -124,6 +128,22 @@ std::vector<LimitNode> limit_nodes(const Path& path, const FrameMap& map,
     }
   }
   return nodes;
+}
+
+void extend_nodes(const Path& path, const FrameMap& map, const MotionLimits& limits,
+                  const std::optional<ProbingLimit>& probing, std::vector<LimitNode>& nodes) {
+  // The last nodes stood where the path ended then, the first two of the new ones know only one
+  // neighbour; the new ones stand where the old ones do.
+  constexpr std::size_t kAnew = 4, kOneSided = 2;
+  if (nodes.size() < kAnew + kOneSided) {
+    nodes = limit_nodes(path, map, limits, probing, nodes.empty() ? 0 : nodes.front().s);
+    return;
+  }
+  const std::size_t kept = nodes.size() - kAnew;
+  const std::vector<LimitNode> more =
+      limit_nodes(path, map, limits, probing, nodes[kept - kOneSided].s);
+  nodes.resize(kept);
+  nodes.insert(nodes.end(), more.begin() + kOneSided, more.end());
 }
 
 }  // namespace vcnc

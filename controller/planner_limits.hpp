@@ -35,6 +35,13 @@ AxisPoint axis_point(const FrameMap& map, const PathPoint& point);
 /// Largest ds/dt that the programmed feed allows at s, where the path has the derivative dx.
 double feed_limit(const Path& path, double s, const Coordinates& dx);
 
+/// What the probe allows while it is in the spindle: of rapids, of turning axes, of blends.
+std::optional<ProbingLimit> probing_limit(const Machine& machine);
+
+/// Largest ds/dt that feed and probe allow at s, where the path has the derivative dx.
+double speed_limit(const Path& path, double s, const Coordinates& dx, const AxisPoint& axes,
+                   const std::optional<ProbingLimit>& probing);
+
 struct LimitNode {
   double s = 0;
   double v_max = 0;        ///< by feed and by the parts of the limits named above [m/s]
@@ -45,12 +52,14 @@ struct LimitNode {
   double acceleration(double v, double window, const MotionLimits& limits) const;
 };
 
-/// What the probe allows while it is in the spindle: of rapids, of turning axes, of blends.
-std::optional<ProbingLimit> probing_limit(const Machine& machine);
-
-/// Nodes from 0 to the length of the path, as dense as the path is sharp.
+/// Nodes from `from` to where the path is settled, as dense as the path is sharp.
 std::vector<LimitNode> limit_nodes(const Path& path, const FrameMap& map,
                                    const MotionLimits& limits,
-                                   const std::optional<ProbingLimit>& probing = {});
+                                   const std::optional<ProbingLimit>& probing = {},
+                                   double from = 0);
+
+/// Goes on with the nodes of a path that was extended.
+void extend_nodes(const Path& path, const FrameMap& map, const MotionLimits& limits,
+                  const std::optional<ProbingLimit>& probing, std::vector<LimitNode>& nodes);
 
 }  // namespace vcnc

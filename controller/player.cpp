@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -13,17 +14,18 @@
 #include "controller/path.hpp"
 #include "controller/planner.hpp"
 #include "controller/planner_limits.hpp"
+#include "controller/rate_planner.hpp"
 #include "model/effects/chain.hpp"
 
 namespace vcnc {
 namespace {
 
-// A longer run stops once in between, so that planning it takes bounded memory.
-constexpr std::size_t kMostMoves = 50'000;
-constexpr double kLongestWay = 200;       ///< [m] of the controlled point
-constexpr double kLongestSeconds = 3600;  ///< at the programmed feed
-constexpr double kMostNodes = 1e7;        ///< of the plan, estimated
-constexpr double kLongestMove = 36000;    ///< [s] at the limits of the axes
+// A longer run is planned in batches of about this size, so that it takes bounded memory.
+constexpr std::size_t kMostMoves = 20'000;
+constexpr double kLongestWay = 20;       ///< [m] of the controlled point
+constexpr double kLongestSeconds = 600;  ///< at the programmed feed
+constexpr double kMostNodes = 4e6;       ///< of the plan, estimated
+constexpr double kLongestMove = 36000;   ///< [s] at the limits of the axes
 constexpr double kExactCorner = 1.0 * kDegree;
 constexpr double kLargestChord = 2 * kPi / 3;  ///< angle of a chord
 constexpr int kMostChords = 20'000;            ///< per arc
@@ -164,7 +166,7 @@ ProbingBound probing_bound(const Move& move, const Machine& machine, const Probi
 /// of the controlled point, of rotary axes or by time is what a program asks for, so it is refused;
 /// rapids, and what axes do besides in order to turn, the planner slows down.
 void check_probing_feed(const Move& move, const Machine& machine, const ProbingLimit& probing,
-                        const std::string& path_name) {
+                        const std::string& path_name, bool inches) {
   const ProbingBound bound = probing_bound(move, machine, probing);
   const char* side = bound.by == ProbingBound::By::axial ? "axial" : "lateral";
   if (bound.factor <= 0)
@@ -173,7 +175,7 @@ void check_probing_feed(const Move& move, const Machine& machine, const ProbingL
         "any speed: see probe.range_mm, probe.overtravel_{}_mm, probe.overtravel_force_{}_N",
         path_name, move.line, side, side, side));
   if (move.feed_mode == Move::Feed::none || bound.factor >= 1 - kFeedRounding) return;
-  const double feed = move.feed_mode == Move::Feed::tip      ? move.feed * 60e3
+  const double feed = move.feed_mode == Move::Feed::tip ? move.feed * 60 / (inches ? 25.4e-3 : 1e-3)
                       : move.feed_mode == Move::Feed::rotary ? move.feed * 60 / kDegree
                                                              : 60 / move.feed;
   const std::string why =
@@ -189,7 +191,7 @@ void check_probing_feed(const Move& move, const Machine& machine, const ProbingL
                                  path_name, move.line, feed_word(feed), why, lever,
                                  move.feed_mode == Move::Feed::tip ? "in this direction" : "here",
                                  feed_word(feed * bound.factor),
-                                 move.feed_mode == Move::Feed::tip      ? "mm/min"
+                                 move.feed_mode == Move::Feed::tip ? inches ? "inch/min" : "mm/min"
                                  : move.feed_mode == Move::Feed::rotary ? "deg/min"
                                                                         : "1/min"));
 }
@@ -229,48 +231,124 @@ void add_chords(const Move& arc, double sagitta, std::vector<Move>& moves) {
   }
 }
 
+/// From where the axes are switched on to where a program begins in its middle.
+std::deque<Block> approach_to(const BlockStart& start, const Machine& machine) {
+  const Kinematics kinematics(machine.kinematics, 0, Vec3::Zero());
+  const AxisVector target = as_axes(start.position);
+  const ToolPose pose = kinematics.forward(target);
+  AxisVector before =
+      kinematics.inverse(pose.p_WT + Player::kStandOff * pose.R_WT.col(2), target[kA], target[kC]);
+  constexpr double kRounding = 1e-12;
+  for (std::size_t i = 0; i < kA; ++i) {
+    const AxisLimits& limits = machine.axes[i].limits;
+    if (std::abs(before[i] - target[i]) < kRounding) before[i] = target[i];
+    if (before[i] < limits.min || before[i] > limits.max) before = target;
+  }
+  std::deque<Block> blocks;
+  Move move;
+  move.kind = Move::Kind::rapid;
+  move.alone = true;
+  move.tolerance = machine.nc.blend_tolerance;
+  move.line = start.line;
+  move.end = start_coordinates(machine);
+  const auto go = [&](std::initializer_list<std::size_t> axes, const Coordinates& to) {
+    move.start = move.end;
+    for (const std::size_t axis : axes)
+      move.end[static_cast<Eigen::Index>(axis)] = to[static_cast<Eigen::Index>(axis)];
+    if (move.start != move.end) blocks.emplace_back(move);
+  };
+  const Coordinates stand_off = Eigen::Map<const Coordinates>(before.data());
+  Coordinates up = move.end;
+  up[kZ] = std::max(up[kZ], stand_off[kZ]);
+  if (move.end != start.position) {
+    go({kZ}, up);
+    go({kA, kC}, stand_off);
+    go({kX, kY}, stand_off);
+    go({kZ}, stand_off);
+  }
+  if (start.spindle.mode != SpindleWord::Mode::off) blocks.emplace_back(start.spindle);
+  move.kind = Move::Kind::line;
+  move.feed_mode = Move::Feed::tip;
+  move.feed = Player::kApproachSpeed;
+  go({kX, kY, kZ}, start.position);
+  return blocks;
+}
+
 }  // namespace
 
 struct Player::State {
-  State(const std::string& file, const Machine& the_machine)
-      : machine(the_machine), program(file, the_machine) {
+  State(const std::string& file, const Machine& the_machine, const PlayerOptions& options)
+      : machine(the_machine),
+        file_name(file),
+        program(file, the_machine, options.interpreter),
+        rates(the_machine),
+        probing(probing_limit(the_machine)) {
+    panel.block_delete = options.interpreter.block_delete;
+    data = options.interpreter.data;
     for (std::size_t i = 0; i < kAxisCount; ++i) step.position[i] = machine.axes[i].limits.start;
     step.tip = start_coordinates(machine).head<3>();
     machine_chain<PlanPort>(machine.effects, 0).step(allowed, {});
+    constexpr double kLongestHold = 3.5, kMore = 1;  // of v/a: time_for() of rate 1, and rounding
+    for (const AxisParams& axis : machine.axes)
+      ahead =
+          std::max(ahead, kMore + kLongestHold * axis.limits.velocity / axis.limits.acceleration);
+    if (options.from_line > 0) {
+      begins_at = program.run_to(options.from_line);
+      approach = approach_to(*begins_at, machine);
+      for (const Block& block : approach)
+        if (const Move* move = std::get_if<Move>(&block)) check_move(*move, machine, file);
+    }
   }
 
   const Machine machine;
+  const std::string file_name;
   GcodeInterpreter program;
   PlanPort::Signal<double> allowed;
+  std::optional<BlockStart> begins_at;
+  std::deque<Block> approach;    ///< to it, still to be played
   std::optional<Block> pending;  ///< read, not yet played
+  std::optional<Move> last;      ///< taken into the run
   std::optional<Trajectory> run;
+  double ahead = 0;            ///< how much of its path has to be known [s]
   Tick cycle = 0, cycles = 0;  ///< within the run or the dwell
   Tick begun = 0;              ///< cycles of the program when it began
   PlayerStep step;
   Tick played = 0;  ///< cycles since the program began
-  bool holding = false, rising = false;
-  Tick rate_cycle = 0;    ///< since the hold, or since the feed began to rise
-  double rate_time = 0;   ///< T_h, T_g [s]
-  double rate_start = 0;  ///< time on the path when it began [s]
-  double held_rate = 0;   ///< r
+
+  bool whole = true;  ///< the run is at whole cycles of its own, at rate 1
+  RateChange law;     ///< otherwise this is how its time passes
+  Tick law_cycle = 0, law_base = 0;
+  bool holding = false, rising = false;  ///< hold(), go_on()
+
+  RatePlanner rates;
+  const std::optional<ProbingLimit> probing;
+  PanelSwitches panel;
+  bool feed_held = false;             ///< the operator's
+  bool attended = false;              ///< somebody will press cycle start
+  bool unchecked = false;             ///< the switches have made another program of it
+  std::optional<RateChange> planned;  ///< what has to begin at its place on the path
+  double boosted_for = 0;             ///< override that the present rate above 1 was chosen for
+  double next_try = 0;                ///< on the path: not before it a rate above 1 is looked for
+  double next_stop = 0;               ///< on the path: not before it a block's end is looked for
+  Tick tries = 0;                     ///< cycles in which a change had to wait
+  enum class Wait { none, block, stop };
+  Wait wait = Wait::none;  ///< for cycle start, besides a feed hold
+  Tick idle = 0;           ///< cycles at rest in it
+  Tick stop_cycles = 0;    ///< that the stop counts in the program's time
+  bool block_done = false;
+  NcData data;
+  Tick data_at = 0;  ///< when it was looked at
 
   /// Time on the path of the run now [s].
   double path_time() const {
     if (!run) return 0;
-    const double s = std::min(seconds(rate_cycle) / rate_time, 1.0);
-    const double tau =
-        holding  ? rate_start + held_rate * rate_time * (s - s * s * s + 0.5 * s * s * s * s)
-        : rising ? rate_start + rate_time * (s * s * s - 0.5 * s * s * s * s)
-                 : seconds(cycle);
+    const double tau = whole ? seconds(cycle) : law.path_time(seconds(law_cycle));
     return std::min(tau, run->duration());
   }
 
   /// d tau / dt now.
-  double rate() const {
-    const double s = std::min(seconds(rate_cycle) / rate_time, 1.0);
-    const double share = s * s * (3 - 2 * s);
-    return holding ? held_rate * (1 - share) : rising ? share : 1;
-  }
+  double rate() const { return whole ? 1 : law.rate(seconds(law_cycle)); }
+  bool changing() const { return !whole && !law.over(seconds(law_cycle)); }
 
   /// Time in which the rate can change by `rate` so that no axis takes more than half of its
   /// acceleration limit for it, at the velocities of the path at `tau`.
@@ -286,20 +364,20 @@ struct Player::State {
 
   /// Begins to brake where the run stands now.
   void begin_hold() {
-    const double tau = path_time();
-    held_rate = rising ? rate() : 1;
-    rate_time = run ? time_for(held_rate, tau) : kCycle;
-    rate_start = tau;
-    rate_cycle = 0;
+    const double tau = path_time(), now = rate();
+    law = {tau, now, 0, run ? time_for(now, tau) : kCycle};
+    law_cycle = 0;
+    whole = false;
     holding = true;
     rising = false;
+    planned.reset();
   }
 
-  bool held() const { return holding && (!run || seconds(rate_cycle) >= rate_time); }
+  bool held() const { return holding && (!run || law.over(seconds(law_cycle))); }
 
   /// Time on the path at which a hold comes to rest [s].
   double rest_time() const {
-    return run ? std::min(rate_start + 0.5 * held_rate * rate_time, run->duration()) : 0;
+    return run ? std::min(law.start + 0.5 * law.from * law.time, run->duration()) : 0;
   }
 
   /// Whole cycles of the run or dwell that have passed at a time on its path.
@@ -308,24 +386,35 @@ struct Player::State {
   }
 
   void begin_rise() {
+    holding = false;
     if (!run) {  // a dwell simply goes on
-      holding = false;
+      whole = true;
       return;
     }
     const double tau = path_time();
-    double time = time_for(1, tau);
+    const double to = std::min(goal(run->at(tau)), 1.0);
+    if (feed_held || wait == Wait::block || to == 0) {
+      law = {tau, 0, 0, 0};
+      return;
+    }
+    double time = time_for(to, tau);
     constexpr int kLooks = 8;
-    for (int i = 1; i <= kLooks; ++i) time = std::max(time, time_for(1, tau + time * i / kLooks));
-    // T_g / 2 = (n + fraction) cycles, so that tau is whole at its end.
-    const Tick whole = whole_cycles(tau);
-    const double fraction = tau / kCycle - static_cast<double>(whole);
-    const double n = std::ceil(0.5 * time / kCycle);
-    rate_time = 2 * (n + fraction) * kCycle;
-    cycle = whole - static_cast<Tick>(n);  // what is added until then: n + fraction of T_g
-    rate_start = tau;
-    rate_cycle = 0;
-    holding = false;
+    for (int i = 1; i <= kLooks; ++i) time = std::max(time, time_for(to, tau + time * i / kLooks));
+    const double fraction = tau / kCycle - std::floor(tau / kCycle);
+    if (to == 1) time = 2 * (std::ceil(0.5 * time / kCycle) + fraction) * kCycle;
+    begin_change({tau, 0, to, time});
     rising = true;
+  }
+
+  void begin_change(const RateChange& change) {
+    const AlignedChange exact = aligned(change);
+    law = exact.change;
+    law_base = exact.base;
+    law_cycle = 0;
+    whole = false;
+    planned.reset();
+    tries = 0;
+    next_stop = 0;
   }
 
   /// One cycle along the path at the rate that holds then.
@@ -340,20 +429,25 @@ struct Player::State {
   }
 
   void brake() {
-    ++rate_cycle;
+    ++law_cycle;
     move_on_path();
   }
 
-  void rise() {
-    ++rate_cycle;
-    if (seconds(rate_cycle) < rate_time) {
-      move_on_path();
-      return;
+  /// One cycle by the law of the rate.
+  void roll() {
+    ++law_cycle;
+    if (!changing()) {
+      rising = false;
+      if (law.to == 1 && law.from != 1) {
+        cycle = law_base + law_cycle;
+        whole = true;
+        played = begun + cycle;
+        play();
+        return;
+      }
     }
-    cycle += rate_cycle;  // whole again
-    rising = false;
-    played = begun + cycle;
-    play();
+    move_on_path();
+    if (run->complete() && path_time() >= run->duration()) end_run();
   }
 
   /// The run at whole cycles, as programmed.
@@ -364,40 +458,240 @@ struct Player::State {
     step.tip = sample.tip;
     step.feed = sample.tip_speed;
     step.line = sample.line;
-    if (cycle >= cycles) {
-      cycle = cycles;
-      played = begun + cycle;
-      run.reset();
+    if (cycle >= cycles) end_run();
+  }
+
+  void end_run() {
+    cycle = cycles;
+    played = begun + cycle;
+    run.reset();
+    whole = true;
+    rising = false;
+    planned.reset();
+    block_done = true;
+  }
+
+  // ----------------------------------------------------------------------------- the operator
+
+  bool rapid() const { return run->path().segments().front().move.kind == Move::Kind::rapid; }
+
+  /// The rate that the switches ask for.
+  double goal(const MotionSample& now) const {
+    if (rapid()) return panel.rapid;
+    return now.panel == Move::Panel::acts ? panel.feed : 1;
+  }
+
+  bool at_rest() const { return !run || (!changing() && rate() == 0); }
+  bool waiting() const { return at_rest() && (feed_held || wait != Wait::none); }
+
+  /// Waits for cycle start, which nobody needs to press where nobody is there.
+  void stand() {
+    ++idle;
+    if (!attended && seconds(idle) >= kProgramStopSeconds) start();
+  }
+
+  void start() {
+    idle = 0;
+    feed_held = false;
+    block_done = false;
+    if (wait == Wait::stop) played += stop_cycles;
+    wait = Wait::none;
+  }
+
+  /// Before a cycle of motion: does the rate have to change from here on?
+  void steer() {
+    constexpr Tick kBetweenTries = 10, kPatience = 500;
+    const bool at_ease = panel.feed == 1 && panel.rapid == 1 && !panel.single_block && !feed_held;
+    if (changing() || (at_ease && whole && !planned)) return;
+    const double tau = path_time(), now = rate();
+    if (planned && tau + now * kCycle > planned->start) {
+      meet_planned(tau, now);
+      return;
+    }
+    const MotionSample here = run->at(tau);
+    double to = goal(here);
+    if (panel.single_block) to = std::min(to, 1.0);
+    if (feed_held && here.panel != Move::Panel::locked) to = 0;
+    if (panel.single_block && now > 0 && to > 0 && !planned && tau >= next_stop)
+      plan_stop(tau, now);
+    if (now == 0) {
+      if (to > 0) rise(tau, std::min(to, 1.0));
+      return;
+    }
+    const bool fast = now > 1 && boosted_for == to;
+    if (to > 1 && (now == 1 || fast)) {
+      if (tau >= next_try) boost(tau, now, to);
+      return;
+    }
+    if (to == now) return;
+    if (tries++ % kBetweenTries != 0) return;
+    to = std::min(to, 1.0);
+    if (const auto change = rates.change(*run, tau, now, to))
+      begin_change(*change);
+    else if (tries > kPatience && now <= 1)
+      begin_change(rates.slowest(*run, tau, now, to));
+  }
+
+  /// Begins a planned change, which ends where it was planned to.
+  void meet_planned(double tau, double now) {
+    const double end = planned->start + planned->way(), to = planned->to;
+    begin_change({tau, now, to, 2 * std::max(end - tau, 0.0) / (now + to)});
+    if (to == 0) wait = Wait::block;
+  }
+
+  /// From rest on the path.
+  void rise(double tau, double to) {
+    if (panel.single_block) {
+      const double end = RatePlanner::block_end(*run, tau);
+      if (end < run->duration()) {
+        rise_within(tau, end, to);
+        return;
+      }
+    }
+    const auto change = rates.change(*run, tau, 0, to);
+    begin_change(change ? *change : rates.slowest(*run, tau, 0, to));
+  }
+
+  /// From rest to rest within one block, at the largest rate that it has room for.
+  void rise_within(double tau, double end, double to) {
+    constexpr double kLess = 0.7, kLeast = 0.02, kShortest = 20 * kCycle;
+    for (double most = to; most > kLeast; most *= kLess) {
+      const auto up = rates.change(*run, tau, 0, most);
+      if (!up) continue;
+      const auto down = rates.change_ending(*run, end, most, 0, tau + up->way());
+      if (!down) continue;
+      begin_change(*up);
+      planned = down;
+      return;
+    }
+    const double most = std::min(to, (end - tau) / kShortest), time = (end - tau) / most;
+    begin_change({tau, 0, most, time});
+    planned = RateChange{tau + 0.5 * most * time, most, 0, time};
+  }
+
+  /// The end of this block, or of the next one that leaves room for braking.
+  void plan_stop(double tau, double now) {
+    constexpr int kMostBlocks = 50;
+    constexpr double kNextLook = 0.02;  // more of the path is known then [s]
+    double end = tau;
+    for (int i = 0; i < kMostBlocks; ++i) {
+      end = RatePlanner::block_end(*run, end);
+      if (end >= run->duration()) break;
+      planned = rates.change_ending(*run, end, now, 0, tau);
+      if (planned) return;
+    }
+    next_stop = run->complete() ? end : tau + kNextLook;
+  }
+
+  /// Above the programmed feed as far as the plan leaves room for it, and back before that ends.
+  void boost(double tau, double now, double to) {
+    constexpr double kNextTry = 0.02, kNextLook = 0.2, kNarrow = 0.1;
+    next_try = tau + kNextTry;
+    for (const double share : {1.0, 0.75, 0.5, 0.25}) {
+      const double fast = 1 + share * (to - 1);
+      if (fast < now) break;
+      // The way down is lengthened until it ends at a whole cycle.
+      const double reserve = (2 + (1 + fast) / (fast - 1)) * kCycle;
+      const double until = rates.fast_until(*run, tau, fast) - reserve;
+      const double known = planned && fast == now ? planned->start + planned->way() : tau;
+      if (until - known < kNarrow) continue;
+      const auto up =
+          fast > now ? rates.change(*run, tau, now, fast) : RateChange{tau, now, now, 0};
+      if (!up) continue;
+      const auto down =
+          rates.change_ending(*run, until, fast, 1, tau + up->way() + 2 * fast * kCycle);
+      if (!down) continue;
+      if (fast > now) begin_change(*up);
+      planned = down;
+      boosted_for = to;
+      next_try = tau + kNextLook;
+      return;
     }
   }
 
+  /// A run begins at rest, where its rate can be any at once.
+  void begin_rate() {
+    whole = true;
+    planned.reset();
+    tries = 0;
+    next_try = next_stop = boosted_for = 0;
+    const double to = std::min(goal(run->at(0)), 1.0);
+    if (to != 1) {
+      whole = false;
+      law = {0, to, to, 0};
+      law_cycle = 0;
+    }
+    if (!panel.single_block || to == 0) return;
+    const double end = RatePlanner::block_end(*run, 0);
+    if (end >= run->duration()) return;
+    planned = rates.change_ending(*run, end, to, 0, 0);
+    if (planned) return;
+    whole = false;
+    law = {0, 0, 0, 0};
+    law_cycle = 0;
+  }
+
+  // ---------------------------------------------------------------------------------- blocks
+
+  Block read() {
+    if (!approach.empty()) {
+      Block first = std::move(approach.front());
+      approach.pop_front();
+      return first;
+    }
+    Block block = program.next();
+    if (const Move* move = std::get_if<Move>(&block); move && unchecked) {
+      check_move(*move, machine, file_name);
+      if (probing) check_probing_feed(*move, machine, *probing, file_name, program.inches());
+    }
+    return block;
+  }
+
   Block take() {
-    if (!pending) return program.next();
+    if (!pending) return read();
     Block block = std::move(*pending);
     pending.reset();
     return block;
   }
 
-  /// Collects the moves that follow without a stop, and plans them.
-  void begin_run(Move first) {
-    std::vector<Move> moves{std::move(first)};
-    double way = way_of(moves.back()), time = seconds_of(moves.back());
-    double nodes = nodes_of(moves.back());
-    while (moves.size() < kMostMoves && way < kLongestWay && time < kLongestSeconds &&
-           nodes < kMostNodes) {
-      pending = program.next();
+  /// Collects moves that follow without a stop, at most about as many as are planned at once.
+  MoveBatch gather() {
+    MoveBatch batch;
+    double way = 0, time = 0, nodes = 0;
+    while (!batch.open) {
+      if (!pending) pending = read();
       Move* next = std::get_if<Move>(&*pending);
-      if (!next || !continues(moves.back(), *next)) break;
-      moves.push_back(std::move(*next));
+      if (!next || (last && !continues(*last, *next))) break;
+      way += way_of(*next);
+      time += seconds_of(*next);
+      nodes += nodes_of(*next);
+      last = *next;
+      batch.moves.push_back(std::move(*next));
       pending.reset();
-      way += way_of(moves.back());
-      time += seconds_of(moves.back());
-      nodes += nodes_of(moves.back());
+      batch.open = batch.moves.size() >= kMostMoves || way >= kLongestWay ||
+                   time >= kLongestSeconds || nodes >= kMostNodes;
     }
-    Path path(as_allowed(std::move(moves)), machine.nc.angle_tolerance);
+    batch.moves = as_allowed(std::move(batch.moves));
+    return batch;
+  }
+
+  void begin_run(Move first) {
+    last.reset();
+    pending = std::move(first);
+    MoveBatch batch = gather();
+    Path path(std::move(batch.moves), machine.nc.angle_tolerance, batch.open);
     if (path.segments().empty()) return;
-    run.emplace(std::move(path), machine);
-    begin_wait(run->duration());
+    run.emplace(std::move(path), machine, [this] { return gather(); });
+    begin_wait(0);
+    look_ahead();
+    begin_rate();
+  }
+
+  /// Plans the run as far as it will be asked for in this cycle, by a hold and its end as well.
+  void look_ahead() {
+    const double tau = path_time();
+    run->plan(tau, tau + ahead);
+    cycles = run->complete() ? cycles_of(run->duration()) : std::numeric_limits<Tick>::max();
   }
 
   /// The moves of a run with what the planner allows itself.
@@ -419,7 +713,11 @@ struct Player::State {
   void begin_wait(double seconds) {
     begun = played;
     cycle = 0;
-    cycles = static_cast<Tick>(std::ceil(seconds / kCycle - 1e-9));
+    cycles = cycles_of(seconds);
+  }
+
+  static Tick cycles_of(double seconds) {
+    return static_cast<Tick>(std::ceil(seconds / kCycle - 1e-9));
   }
 
   void begin_spindle(const SpindleWord& word) {
@@ -449,7 +747,12 @@ struct Player::State {
 
   /// Starts blocks until one takes time or the program ends.
   void begin_next() {
-    while (cycle >= cycles && !step.done) {
+    constexpr Tick kDataEvery = 1000;
+    if (played - data_at >= kDataEvery) {
+      data = program.data();
+      data_at = played;
+    }
+    while (cycle >= cycles && !step.done && wait == Wait::none) {
       Block block = take();
       if (Move* move = std::get_if<Move>(&block)) {
         step.line = move->line;
@@ -462,26 +765,44 @@ struct Player::State {
         begin_spindle(*word);
       } else if (const ProgramStop* stop = std::get_if<ProgramStop>(&block)) {
         step.line = stop->line;
-        if (!stop->optional) begin_wait(kProgramStopSeconds);
+        const Tick counted = stop->optional ? 0 : cycles_of(kProgramStopSeconds);
+        if (stop->optional ? panel.optional_stop && !stop->tool_change : attended) {
+          wait = Wait::stop;
+          stop_cycles = counted;
+        } else {
+          begin_wait(seconds(counted));
+        }
       } else {
         step.line = std::get<ProgramEnd>(block).line;
         step.spindle = PlayerStep::Spindle::off;
         step.spindle_speed = 0;
         step.done = true;
+        data = program.data();
       }
     }
   }
 };
 
-Player::Player(const std::string& path, const Machine& machine) {
-  GcodeInterpreter check(path, machine);
+Player::Player(const std::string& path, const Machine& machine, const PlayerOptions& options) {
+  GcodeInterpreter check(path, machine, options.interpreter);
   const std::optional<ProbingLimit> probing = probing_limit(machine);
   for (Block block = check.next(); !std::holds_alternative<ProgramEnd>(block); block = check.next())
     if (const Move* move = std::get_if<Move>(&block)) {
       check_move(*move, machine, path);
-      if (probing) check_probing_feed(*move, machine, *probing, path);
+      if (probing) check_probing_feed(*move, machine, *probing, path, check.inches());
     }
-  state_ = std::make_unique<State>(path, machine);
+  if (options.from_line > 0) {
+    const long passes =
+        GcodeInterpreter(path, machine, options.interpreter).passes_of(options.from_line);
+    if (passes != 1)
+      throw ProgramError(fmt::format(
+          "{}:{}: the program cannot begin here: {}", path, options.from_line,
+          passes == 0 ? "this line is never read"
+                      : fmt::format("this line is read {} times, in a loop or a subroutine; begin "
+                                    "before it",
+                                    passes)));
+  }
+  state_ = std::make_unique<State>(path, machine, options);
 }
 
 Player::~Player() = default;
@@ -497,6 +818,38 @@ void Player::go_on() {
 }
 
 bool Player::at_full_rate() const { return !state_->holding && !state_->rising; }
+
+void Player::operate(const PanelSwitches& switches) {
+  State& state = *state_;
+  if (switches.feed != state.panel.feed) state.next_try = 0;
+  if (switches.single_block != state.panel.single_block) state.next_stop = 0;
+  if (switches.block_delete != state.panel.block_delete) {
+    state.program.block_delete(switches.block_delete);
+    state.unchecked = true;
+  }
+  if (!switches.single_block && state.panel.single_block) {
+    if (state.planned && state.planned->to == 0) state.planned.reset();
+  }
+  state.panel = switches;
+}
+
+void Player::feed_hold() { state_->feed_held = true; }
+
+void Player::cycle_start() { state_->start(); }
+
+void Player::attended(bool somebody) { state_->attended = somebody; }
+
+bool Player::waiting() const { return state_->waiting(); }
+
+bool Player::stands_at_zero() const {
+  const State& state = *state_;
+  return state.run && !state.holding && state.at_rest() && !state.waiting() &&
+         state.goal(state.run->at(state.path_time())) == 0;
+}
+
+const std::optional<BlockStart>& Player::begins_at() const { return state_->begins_at; }
+
+const NcData& Player::data() const { return state_->data; }
 
 ProgramTime Player::time() const {
   const State& state = *state_;
@@ -515,10 +868,9 @@ void Player::seek(const ProgramTime& time) {
   while (state.played < time.cycles && !state.step.done) step();
   if (state.played != time.cycles) throw std::out_of_range("the program ends before that moment");
   state.holding = true;
-  state.rate_start = time.on_path;
-  state.held_rate = 0;
-  state.rate_time = seconds(1);
-  state.rate_cycle = 1;
+  state.whole = false;
+  state.law = {time.on_path, 0, 0, seconds(1)};
+  state.law_cycle = 1;
   if (state.run) state.move_on_path();
 }
 
@@ -527,23 +879,45 @@ PlayerStep Player::step() {
   PlayerStep& step = state.step;
   step.velocity = {};
   step.feed = 0;
+  if (state.run) state.look_ahead();
   if (state.holding) {
     if (state.run) state.brake();
     return step;
   }
   if (state.rising) {
-    state.rise();
+    state.roll();
+    return step;
+  }
+  if (!state.run && state.cycle >= state.cycles && state.panel.single_block && state.block_done)
+    state.wait = State::Wait::block;
+  if (state.waiting()) {
+    state.stand();
+    step.dwell = true;
     return step;
   }
   if (state.cycle >= state.cycles) state.begin_next();
   step.dwell = false;
   if (step.done) return step;
+  if (state.wait == State::Wait::stop) {  // M0, M1
+    state.stand();
+    step.dwell = true;
+    return step;
+  }
+  if (state.run) {
+    state.steer();
+    if (!state.whole) {
+      state.roll();
+      return step;
+    }
+  }
   ++state.cycle;
   ++state.played;
-  if (state.run)
+  if (state.run) {
     state.play();
-  else
+  } else {
     step.dwell = true;
+    if (state.cycle >= state.cycles) state.block_done = true;
+  }
   return step;
 }
 

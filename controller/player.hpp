@@ -2,9 +2,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "bus/tick.hpp"
+#include "controller/gcode/interpreter.hpp"
+#include "controller/operation.hpp"
 #include "controller/program_error.hpp"
 #include "model/axes.hpp"
 #include "model/input_error.hpp"
@@ -22,7 +25,7 @@ struct PlayerStep {
   int line = 0;             ///< program line (1-based line of the file)
   Spindle spindle = Spindle::off;
   double spindle_speed = 0;  ///< [rad/s]
-  bool dwell = false;        ///< G4, M0 or waiting for the spindle
+  bool dwell = false;        ///< G4, M0, or waiting for the spindle or the operator
   bool done = false;         ///< M2/M30 reached, axes at rest
 };
 
@@ -33,14 +36,26 @@ struct ProgramTime {
   double on_path = 0;  ///< exact time on the path of the motion going on [s]
 };
 
+struct PlayerOptions {
+  InterpreterOptions interpreter{};
+  int from_line = 0;  ///< the program begins there (controller/gcode/block_search.hpp); 0: not
+};
+
 class Player {
  public:
   /// Reads and checks the whole program before anything moves: syntax, unknown words, axis limits
   /// of end points, missing feed, ... Throws ProgramError.
-  Player(const std::string& path, const Machine& machine);
+  Player(const std::string& path, const Machine& machine, const PlayerOptions& options = {});
   ~Player();
 
-  /// Next cycle. `start` positions are those of the machine file.
+  /// Where the program begins, if that is in its middle. The axes go there on their own: Z up, the
+  /// rotary axes, X and Y, Z down to kStandOff before the place along the tool, spindle, the rest
+  /// at kApproachSpeed.
+  const std::optional<BlockStart>& begins_at() const;
+  static constexpr double kStandOff = 20e-3, kApproachSpeed = 10e-3;
+
+  /// Next cycle. `start` positions are those of the machine file. Throws ProgramError only where
+  /// the switch for block delete has made another program of the one that was checked.
   PlayerStep step();
 
   /// Feed hold: from the next cycle on the axes come to rest on the path, along
@@ -58,6 +73,24 @@ class Player {
   /// is one of the uninterrupted program, to the bit.
   void go_on();
   bool at_full_rate() const;  ///< neither held nor speeding up
+
+  /// The switches of the panel, from the next cycle on. The overrides change the rate at which the
+  /// path is run, see controller/rate_planner.hpp. Single block stops where the path passes from
+  /// one block to the next, rounded corners included, and after everything else that takes time.
+  /// Block delete acts on what has not been read yet: the blocks behind the next stop.
+  void operate(const PanelSwitches& switches);
+  /// The operator's feed hold: to rest on the path within the limits of the axes; a dwell stops.
+  void feed_hold();
+  /// Ends a feed hold and the wait for cycle start after M0, M1 or a single block.
+  void cycle_start();
+  /// Whether somebody will press cycle start; otherwise every such wait lasts kProgramStopSeconds.
+  void attended(bool somebody);
+  bool waiting() const;         ///< at rest, for cycle start
+  bool stands_at_zero() const;  ///< at rest, for an override above 0 %
+
+  /// What is kept of offsets, parameters and tools, as at the last stop of the axes; a stop being
+  /// at most one block further than the program has been played.
+  const NcData& data() const;
 
   /// Where the program is; during a hold: where it comes to rest.
   ProgramTime time() const;

@@ -2,7 +2,15 @@
 // every declared number that may be another one.
 //
 // A candidate is a set of machine-file keys with start values and bounds; trying it is setting them
-// on a copy of the declared machine.
+// on a copy of the declared machine. Left out are
+//
+// - effects that no prediction can show, with the reason: no_hypothesis() in effect_stage.hpp;
+// - wind-up and backlash of an axis whose motor side is next to nothing: there are no two masses;
+// - whole numbers (lobes, harmonics, poles per turn), which stay as the library has them, and so
+//   effects that have nothing but those (bus latency, which a command delay describes as well, and
+//   the slip of a period);
+// - declared numbers that an effect stands for: gains, feed-forwards, force limit, torque constant,
+//   ball radius, positions of the rotary axes, of the piece and of the probe.
 #pragma once
 
 #include <string>
@@ -34,5 +42,10 @@ struct Candidate {
 /// The candidates of a machine, in the order of the library. Those whose place the record has no
 /// signal of are left out by the caller.
 std::vector<Candidate> candidates(const Machine& declared);
+
+/// A machine with numbers outside [effects] other than declared, as a hypothesis: the declared
+/// machine, with the effects of `machine` and with a deviation for each of those numbers. Its
+/// controllers know what is declared, its bodies are as `machine` says.
+Machine as_hypothesis(const Machine& declared, const Machine& machine);
 
 }  // namespace vcnc

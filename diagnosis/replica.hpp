@@ -27,6 +27,9 @@ class Replica {
   /// One series per channel, as long as the record; NaN where it says nothing. Deterministic; may
   /// be called from several threads.
   virtual std::vector<std::vector<double>> predict(const Machine& hypothesis) const = 0;
+  /// What follows is asked about machines near this one: a replica may be exact here and quicker
+  /// elsewhere. Not while others predict.
+  virtual void anchor(const Machine&) {}
 };
 
 }  // namespace vcnc

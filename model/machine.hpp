@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "model/axes.hpp"
+#include "model/compensation.hpp"
 #include "model/effects/effects.hpp"
 #include "model/fields.hpp"
 
@@ -72,25 +73,37 @@ struct AxisLimits {
   }
 };
 
-/// Cascade of one drive. Equations: model/drive/axis_drive.hpp.
+/// Controller of one drive. Equations: model/drive/axis_drive.hpp, sampled_controller.hpp.
 struct ServoParams {
   enum class Feedback { motor, load };
+  enum class Controller { cascade, sampled };
+  Controller controller = Controller::cascade;
   double kv_per_s = 40;            ///< position loop gain
   double velocity_bandwidth = 80;  ///< velocity loop crossover [Hz]; Kp = 2 pi f J
-  double integral_time = 0.010;    ///< velocity loop integral time Ti [s]
+  double velocity_gain = 0;        ///< Kp itself [N s/m or N m s/rad]; 0: by the crossover
+  double integral_time = 0.010;    ///< velocity loop integral time Ti [s], cascade only
+  double dead_time = 0;            ///< from a sample to its force [s], sampled only
   double velocity_ff = 1;          ///< 1 = full velocity feed-forward
   double acceleration_ff = 1;      ///< 1 = full acceleration feed-forward
   double current_lag = 0;          ///< first-order lag of the force/torque [s]
   Feedback feedback = Feedback::load;
 
   template <class Self, class Visit>
-  static void fields(Self& p, Visit& visit) {
+  static void fields(Self& p, Visit& visit, bool rotary) {
+    visit.choice("controller", p.controller,
+                 {{"cascade", Controller::cascade}, {"sampled", Controller::sampled}},
+                 "cascade: fast loops in the drive; sampled: P position, P velocity, once a cycle");
     visit("kv_per_s", p.kv_per_s, unit::per_s, Range{0.1, 1000},
           "position loop gain; with full feed-forward an ideal drive does not show it");
     visit("velocity_bandwidth_Hz", p.velocity_bandwidth, unit::hz, Range{1, 1000},
           "velocity loop crossover frequency");
+    visit(rotary ? "velocity_gain_Nms_per_rad" : "velocity_gain_Ns_per_m", p.velocity_gain,
+          rotary ? unit::nm_s_per_rad : unit::n_s_per_m, Range{0, 1e8},
+          "velocity loop gain where it is known; 0: from the crossover frequency and the inertia");
     visit("integral_time_ms", p.integral_time, unit::ms, Range{0.5, 10000},
-          "velocity loop integral time");
+          "velocity loop integral time of a cascade");
+    visit("dead_time_ms", p.dead_time, unit::ms, Range{0, 20},
+          "sampled controller: from the sample to the force it demands");
     visit("velocity_ff", p.velocity_ff, unit::none, Range{0, 2}, "velocity feed-forward, 1 = full");
     visit("acceleration_ff", p.acceleration_ff, unit::none, Range{0, 2},
           "acceleration feed-forward, 1 = full");
@@ -136,7 +149,7 @@ struct AxisParams {
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit, bool rotary) {
     AxisLimits::fields(p.limits, visit, rotary);
-    ServoParams::fields(p.servo, visit);
+    ServoParams::fields(p.servo, visit, rotary);
     MechanicsParams::fields(p.mechanics, visit, rotary);
   }
 
@@ -257,9 +270,13 @@ struct SupplyParams {
 
 /// What the NC unit knows besides the axes.
 struct NcParams {
+  enum class Dynamics { smooth, fast };     ///< controller/planner.hpp
   double blend_tolerance = 10e-6;           ///< G64 without P [m]
   double angle_tolerance = 0.01 * kDegree;  ///< orientation tolerance of blends [rad]
   double rapid_limit = 1.0;                 ///< share of the axis limits used by G0
+  Dynamics dynamics = Dynamics::smooth;     ///< of programs that do not choose
+  CompensationParams compensation;          ///< of the machine's errors
+  std::string program_path;                 ///< folders of subprograms, separated by ':'
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit) {
@@ -269,29 +286,39 @@ struct NcParams {
           "orientation tolerance of blends");
     visit("rapid_limit", p.rapid_limit, unit::none, Range{0.01, 1},
           "share of the axis limits used by G0");
+    visit.choice("dynamics", p.dynamics, {{"smooth", Dynamics::smooth}, {"fast", Dynamics::fast}},
+                 "of programs that do not choose: gentle, or fastest within the axis limits");
+    visit.group("compensation", p.compensation, "of the machine's errors, by the NC unit");
+    visit("program_path", p.program_path,
+          "folders of subprograms, relative to this file, separated by ':'; the program's own is "
+          "searched first");
   }
 };
 
 /// Workpiece, work offsets, tool lengths and what the evaluation needs.
 struct SetupParams {
   std::string piece;  ///< path of a piece file; empty: no workpiece
-  std::array<Vec3, 6> work_offset{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(),
-                                  Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};  ///< G54..G59 [m]
-  std::vector<double> tool_length;  ///< H1, H2, ... [m]; the probe is H1 when empty
-  double predeflection = 0.5e-3;    ///< programmed interference with the piece
-  double tolerance = 50e-6;         ///< verdict: |e_n| must stay within
-  double bin_length = 1e-3;         ///< arc-length bins of the coverage
+  std::array<Vec3, 9> work_offset{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(),
+                                  Vec3::Zero(), Vec3::Zero(), Vec3::Zero(),
+                                  Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};  ///< G54..G59.3 [m]
+  std::vector<double> tool_length;    ///< H1, H2, ... [m]; the probe is H1 when empty
+  std::vector<double> tool_diameter;  ///< D1, D2, ... [m]; that of the ball is D1 when empty
+  double predeflection = 0.5e-3;      ///< programmed interference with the piece
+  double tolerance = 50e-6;           ///< verdict: |e_n| must stay within
+  double bin_length = 1e-3;           ///< arc-length bins of the coverage
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit) {
     visit("piece", p.piece, "piece file, relative to this file; empty: nothing to touch");
-    constexpr std::array<const char*, 6> keys{"g54_mm", "g55_mm", "g56_mm",
-                                              "g57_mm", "g58_mm", "g59_mm"};
+    constexpr std::array<const char*, 9> keys{"g54_mm", "g55_mm",   "g56_mm",   "g57_mm",  "g58_mm",
+                                              "g59_mm", "g59_1_mm", "g59_2_mm", "g59_3_mm"};
     for (std::size_t i = 0; i < keys.size(); ++i)
       visit(keys[i], p.work_offset[i], unit::mm, Range{-1e4, 1e4},
             "work offset, machine frame at A = C = 0");
     visit("tool_length_mm", p.tool_length, unit::mm, Range{0, 1000},
           "tool lengths H1, H2, ...; H1 is the probe's length when empty");
+    visit("tool_diameter_mm", p.tool_diameter, unit::mm, Range{0, 1000},
+          "tool diameters D1, D2, ...; D1 is that of the probe's ball when empty");
     visit("predeflection_mm", p.predeflection, unit::mm, Range{0.01, 5},
           "how deep the program drives the ball into the piece");
     visit("tolerance_um", p.tolerance, unit::um, Range{0.1, 10000},

@@ -1,9 +1,8 @@
 // The scanning probe on the bus: contact physics, sin/cos signals, acquisition module.
 //
 // Cycle k: the true axis motion of cycle k-1 comes through the truth channel, ten samples of 100
-// us. For each of them the tool's pose follows from the axes and the errors of the machine's
-// bodies, the stylus ball is moved on the piece (ProbeContact) and the three channels are digitised
-// (SignalChannel). The last sample is the deflection at t_k and goes out as ProbeSample.
+// us, each of which the probe (model/probe/probe_sensor.hpp) turns into what its module counts. The
+// last sample is the deflection at t_k and goes out as ProbeSample.
 //
 // An axis whose simulator is gone, motion and status alike, stays where it was last.
 #pragma once
@@ -14,11 +13,10 @@
 #include "bus/messages.hpp"
 #include "bus/node.hpp"
 #include "bus/truth.hpp"
-#include "model/geometry/kinematics.hpp"
 #include "model/geometry/piece.hpp"
 #include "model/machine.hpp"
 #include "model/probe/contact.hpp"
-#include "model/probe/signals.hpp"
+#include "model/probe/probe_sensor.hpp"
 
 namespace vcnc {
 
@@ -50,9 +48,7 @@ class ProbeNode : public Node {
  private:
   ProbeNode(const Machine& actual, std::unique_ptr<Piece> piece, std::uint64_t seed,
             TruthPort& truth, const ProbeParams& declared);
-  ToolPose pose(const AxisVector& q);
-  void sample(const AxisVector& q);
-  void follow_motion(const AxisVector& q);
+  void sample(std::size_t j, const AxisVector& q);
   ProbeSample reading(Tick k) const;
   void hold_missing(Tick k, std::span<const Frame> inputs,
                     std::array<TruthCycle, kTruthAxes>& truth) const;
@@ -60,19 +56,10 @@ class ProbeNode : public Node {
   ProbeParams probe_;
   DeviceProfile profile_;
   UsableRange range_;
-  Kinematics kinematics_;
   std::unique_ptr<Piece> piece_;
-  ProbeContact contact_;
-  std::array<SignalChannel, 3> channels_;
-  Chain<PosePort> errors_;
-  Chain<DeflectionPort> feeling_;
-  Chain<ReadingPort> counting_;
-  std::array<ChannelSample, 3> last_;
+  ProbeSensor sensor_;
   std::array<Vec3, kLoopStepsPerCycle> felt_;
-  bool overtravelled_ = false;
   ProbeSample told_;  ///< last reading
-  std::int64_t samples_ = 0;
-  PosePort::Context<double> motion_;  ///< of all axes, where an effect needs it
   TruthPort& truth_;
   AxisVector start_, last_known_;
   std::array<ChannelFault, 3> broken_{};  ///< in this cycle

@@ -227,8 +227,15 @@ double Evaluator::bracketed(Cursor& at, int depth) const {
   const int column = at.column();
   if (!at.take('[')) throw LineError("'[' is missing", column);
   const double x = expression(at, 0, depth);
-  if (!at.take(']')) throw LineError("'[' without its ']'", column);
-  return x;
+  if (at.take(']')) return x;
+  at.skip_blanks();
+  const char c = at.peek();
+  if (!at.at_end() && !is_letter(c) && !is_digit(c) && c > ' ' && c < 0x7f && c != ';' && c != '(')
+    throw LineError(fmt::format("'{}' is no operator; allowed are ** * / + - MOD EQ NE GT GE LT LE "
+                                "AND OR XOR, or ']'",
+                                c),
+                    at.column());
+  throw LineError("'[' without its ']'", column);
 }
 
 double Evaluator::expression(Cursor& at, int lowest_rank, int depth) const {

@@ -22,6 +22,16 @@ GcodeInterpreter::~GcodeInterpreter() = default;
 
 Block GcodeInterpreter::next() { return run_->next(); }
 
+BlockStart GcodeInterpreter::run_to(int line) { return run_->run_to(line); }
+
+long GcodeInterpreter::passes_of(int line) { return run_->passes_of(line); }
+
+NcData GcodeInterpreter::data() const { return run_->data(); }
+
+bool GcodeInterpreter::inches() const { return run_->inches(); }
+
+void GcodeInterpreter::block_delete(bool on) { run_->block_delete(on); }
+
 ProgramRun::ProgramRun(const std::string& path, const Machine& machine, InterpreterOptions options)
     : machine_(machine),
       options_(std::move(options)),
@@ -39,8 +49,10 @@ ProgramRun::ProgramRun(const std::string& path, const Machine& machine, Interpre
            (options_.dialect == Dialect::automatic && unit().flow.macros());
   if (fanuc_) parameters_.last_local(LocalParameters::kCount);
   modal_.tolerance = machine.nc.blend_tolerance;
+  modal_.dynamics = machine.nc.dynamics;
   for (std::size_t i = 0; i < machine.setup.work_offset.size(); ++i)
     work_.systems[i].shift.head<3>() = machine.setup.work_offset[i];
+  take_over(options_.data);
   work_.select(0);
 }
 
@@ -54,17 +66,21 @@ Block ProgramRun::next() {
     ready_at_ = 0;
     while (ready_.empty()) {
       if (ended_) return ProgramEnd{line_number()};
-      try {
-        read_line();
-      } catch (const LineError& error) {
-        const std::string where = unit().text.path() + ":" + std::to_string(line_number());
-        throw ProgramError(error.column > 0
-                               ? fmt::format("{}:{}: {}", where, error.column, error.what())
-                               : fmt::format("{}: {}", where, error.what()));
-      }
+      read_guarded();
     }
   }
   return std::move(ready_[ready_at_++]);
+}
+
+void ProgramRun::read_guarded() {
+  try {
+    read_line();
+  } catch (const LineError& error) {
+    const std::string where = unit().text.path() + ":" + std::to_string(line_number());
+    throw ProgramError(error.column > 0
+                           ? fmt::format("{}:{}: {}", where, error.column, error.what())
+                           : fmt::format("{}: {}", where, error.what()));
+  }
 }
 
 void ProgramRun::read_line() {
@@ -249,8 +265,7 @@ void ProgramRun::execute() {
   set_tilt();
   switch (once) {
     case 51:
-      words_.use("QRP");
-      if (!words_.has('Q')) fail("G5.1 without Q", words_.column(GGroup::once));
+      set_dynamics();
       break;
     case 100:
       set_by_g10();

@@ -18,6 +18,8 @@
 #include <optional>
 #include <string>
 
+#include "controller/gcode/block_search.hpp"
+#include "controller/gcode/nc_data.hpp"
 #include "controller/gcode/tool_table.hpp"
 #include "controller/gcode_blocks.hpp"
 
@@ -31,6 +33,7 @@ struct InterpreterOptions {
   std::optional<ToolTable> tools;  ///< instead of those of the machine
   bool block_delete = false;       ///< lines that begin with / are skipped
   bool bare = false;               ///< no machine: any spindle speed, no tools, no probe
+  NcData data{};                   ///< what earlier programs have changed at the control
 };
 
 class ProgramRun;
@@ -48,6 +51,17 @@ class GcodeInterpreter {
   /// The next block; ProgramEnd is the last one and is repeated. Throws ProgramError
   /// ("FILE:LINE:COLUMN: reason").
   Block next();
+  /// Runs through to the first time that a line of the program's own file is about to be read; the
+  /// next block is its first one. Throws ProgramError where the program cannot begin there.
+  BlockStart run_to(int line);
+  /// How often it is read; runs to the end.
+  long passes_of(int line);
+  /// What of it is kept when the machine is switched off now, as far as the program has been read.
+  NcData data() const;
+  /// The program is in inches (G20) where the last block came from.
+  bool inches() const;
+  /// The switch, for the lines that have not been read yet.
+  void block_delete(bool on);
 
  private:
   std::unique_ptr<ProgramRun> run_;

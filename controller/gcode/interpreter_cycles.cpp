@@ -7,7 +7,10 @@
 //   G73 feed by Q, back by kChipBreak      G83 feed by Q, out to R, rapid back to kPeckClearance
 //   G82 dwell P     G84 G74 tap: dwell, spindle reversed, feed out     G85 feed out
 //   G86 dwell, spindle stop, rapid out     G88 the same     G89 dwell, feed out
+//   While tapping the operator's feed hold waits for the way out, and overrides stand at 100 %.
 //   G76 (Fanuc) dwell, spindle oriented, aside by Q in +X, rapid out, back, spindle on
+//   G87 (Fanuc) oriented, aside by Q, rapid to R below, back, spindle on, feed up to Z, dwell,
+//       oriented, aside, rapid out, back, spindle on
 // Source: LinuxCNC user manual, "Canned cycles"; Fanuc series 30i user's manual for G76.
 #include <fmt/format.h>
 
@@ -36,6 +39,8 @@ void ProgramRun::cycle_move(const Coordinates& words, Move::Kind kind) {
     if (std::abs(move.end[i] - move.start[i]) < 1e-12) move.end[i] = move.start[i];
   if (move.end == move.start) return;
   if (kind == Move::Kind::line) set_move_feed(move);
+  const bool tapping = cycle_.code == 740 || cycle_.code == 840;
+  if (tapping && kind == Move::Kind::line) move.panel = Move::Panel::locked;
   emit_move(std::move(move));
 }
 
@@ -55,7 +60,6 @@ void ProgramRun::cycle_spindle(int code) {
 void ProgramRun::emit_cycle(int code) {
   const std::string name = code_name(code);
   const int column = words_.column(GGroup::motion);
-  if (code == 870) fail("G87 (back boring) is not supported", column);
   need_no_compensation(name.c_str(), column);
   if (modal_.feed == 930) fail(name + " under G93; allowed are G94 and G95", column);
   if (words_.any_of("AC")) fail(name + " with A or C; allowed are X Y Z", column);
@@ -83,7 +87,7 @@ void ProgramRun::emit_cycle(int code) {
     fail("P of a cycle must be 0 to 36000 seconds", words_.column('P'));
   const int turns = code == 840 ? 3 : code == 740 ? 4 : modal_.spindle;
   const bool needs_spindle =
-      code == 740 || code == 760 || code == 840 || code == 860 || code == 880;
+      code == 740 || code == 760 || code == 840 || code == 860 || code == 870 || code == 880;
   if (needs_spindle && modal_.spindle != 3 && modal_.spindle != 4)
     fail(name + " with the spindle at rest; M3 or M4 first", column);
   if (turns != modal_.spindle) fail(fmt::format("{} needs M{}", name, turns), column);
@@ -101,11 +105,18 @@ void ProgramRun::emit_cycle(int code) {
   const double initial = at[w];
   const double plane = modal_.absolute ? *cycle_.r : *cycle_.initial + *cycle_.r;
   const double bottom = modal_.absolute ? *cycle_.z : plane + *cycle_.z;
-  if (bottom > plane)
+  if (code == 870) {
+    if (bottom < plane)
+      fail(fmt::format("{}: {} {:.4f} mm is below R {:.4f} mm, from where it bores upwards", name,
+                       letter_w, bottom * 1e3, plane * 1e3),
+           words_.column(letter_w));
+    if (!modal_.to_initial) fail(name + " under G99; allowed is G98", column);
+    if (!(cycle_.q.value_or(0) > 0)) fail(name + " needs Q greater than 0", column);
+  } else if (bottom > plane)
     fail(fmt::format("{}: R {:.4f} mm is below {} {:.4f} mm", name, plane * 1e3, letter_w,
                      bottom * 1e3),
          words_.column('R'));
-  if (initial < plane) {
+  if (initial < plane && code != 870) {
     at[w] = plane;
     cycle_move(at, Move::Kind::rapid);
   }
@@ -118,8 +129,10 @@ void ProgramRun::emit_cycle(int code) {
       at[axis] = modal_.absolute ? word : at[axis] + word;
     }
     cycle_move(at, Move::Kind::rapid);
-    at[w] = plane;
-    cycle_move(at, Move::Kind::rapid);
+    if (code != 870) {
+      at[w] = plane;
+      cycle_move(at, Move::Kind::rapid);
+    }
     cycle_bottom(code, at, bottom, clear, plane);
     at[w] = clear;
   }
@@ -178,6 +191,27 @@ void ProgramRun::cycle_bottom(int code, Coordinates at, double bottom, double cl
       aside[w] = clear;
       cycle_move(aside, Move::Kind::rapid);
       rapid(clear);
+      cycle_spindle(spindle);
+      break;
+    }
+    case 870: {
+      const auto aside = static_cast<Eigen::Index>((modal_.normal + 1) % 3);
+      const auto across = [&](double way) {
+        at[aside] += way;
+        cycle_move(at, Move::Kind::rapid);
+      };
+      const double shift = cycle_.q.value_or(0);
+      cycle_spindle(19);
+      across(shift);
+      rapid(plane);
+      across(-shift);
+      cycle_spindle(spindle);
+      feed(bottom);
+      cycle_dwell(dwell);
+      cycle_spindle(19);
+      across(shift);
+      rapid(std::max(clear, *cycle_.initial));
+      across(-shift);
       cycle_spindle(spindle);
       break;
     }

@@ -1,8 +1,10 @@
 // The part of the interpreter that leaves the order of the lines: O words, macros, jumps, calls.
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "controller/gcode/interpreter_run.hpp"
 
@@ -181,22 +183,41 @@ void ProgramRun::steer(int i, Cursor at) {
 
 // --------------------------------------------------------------------------------------- calls
 
-/// The first of the files that can be read beside the program, opened once.
+/// The folder of the program, then those of the path.
+std::vector<std::string> ProgramRun::program_folders() const {
+  std::vector<std::string> folders{
+      std::filesystem::path(units_.front()->text.path()).parent_path().string()};
+  const std::string& path = machine_.nc.program_path;
+  for (std::size_t from = 0; from < path.size();) {
+    const std::size_t end = std::min(path.find(':', from), path.size());
+    if (end > from) folders.push_back(path.substr(from, end - from));
+    from = end + 1;
+  }
+  return folders;
+}
+
+/// The first of the files that can be read, beside the program and along the path, opened once.
 std::size_t ProgramRun::find_unit(const std::vector<std::string>& names) {
   namespace fs = std::filesystem;
-  const fs::path folder = fs::path(units_.front()->text.path()).parent_path();
-  for (const std::string& name : names) {
-    const fs::path path = folder / name;
-    for (std::size_t i = 0; i < units_.size(); ++i)
-      if (units_[i]->text.path() == path.string()) return i;
-    std::error_code error;
-    if (!fs::is_regular_file(path, error)) continue;
-    if (units_.size() >= kMostFiles)
-      fail(fmt::format("the program calls more than {} files", kMostFiles));
-    units_.push_back(std::make_unique<Unit>(path.string()));
-    return units_.size() - 1;
-  }
+  for (const std::string& folder : program_folders())
+    for (const std::string& name : names) {
+      const fs::path path = fs::path(folder) / name;
+      for (std::size_t i = 0; i < units_.size(); ++i)
+        if (units_[i]->text.path() == path.string()) return i;
+      std::error_code error;
+      if (!fs::is_regular_file(path, error)) continue;
+      if (units_.size() >= kMostFiles)
+        fail(fmt::format("the program calls more than {} files", kMostFiles));
+      units_.push_back(std::make_unique<Unit>(path.string()));
+      return units_.size() - 1;
+    }
   return units_.size();
+}
+
+/// For messages: "beside it", and along which path.
+std::string ProgramRun::where_sought() const {
+  const std::string& path = machine_.nc.program_path;
+  return path.empty() ? "beside it" : "beside it or in " + path;
 }
 
 void ProgramRun::enter_call(Call call, std::size_t unit_index, const ProgramPlace& place) {
@@ -250,10 +271,8 @@ void ProgramRun::call_sub(const std::string& label, Cursor& at) {
     where = find_unit({bare + ".ngc", bare + ".nc"});
     if (where < units_.size()) sub = units_[where]->flow.sub(label);
     if (sub < 0)
-      fail(
-          fmt::format("O{} call: there is no O{} sub in the program and no file {}.ngc with it "
-                      "beside it",
-                      label, label, bare));
+      fail(fmt::format("O{} call: there is no O{} sub in the program and no file {}.ngc with it {}",
+                       label, label, bare, where_sought()));
   }
   Call call;
   call.own_locals = true;
@@ -288,8 +307,8 @@ void ProgramRun::call_program(int number, long repeats, bool macro_locals) {
                        fmt::format("O{:04}", number), fmt::format("O{:04}.nc", number),
                        fmt::format("{:04}.nc", number), label});
     if (where == units_.size())
-      fail(fmt::format("there is no O{} in the program and no file {}.nc or O{} beside it", number,
-                       number, label));
+      fail(fmt::format("there is no O{} in the program and no file {}.nc or O{} {}", number, number,
+                       label, where_sought()));
     units_[where]->opened = false;
   } else {
     place = units_[where]->flow.line(head).after;
@@ -411,9 +430,27 @@ bool ProgramRun::read_keyword(Cursor& at) {
     siemens_ = 2;
     return true;
   }
+  if (take_dynamics(at)) return true;
   if (at.letters() == "CR" && at.peek(2) == '=') {
     at.advance(3);
     words_.enter('R', evaluator_.bare(at), column);
+    return true;
+  }
+  return false;
+}
+
+/// Siemens' technology groups of the dynamics.
+bool ProgramRun::take_dynamics(Cursor& at) {
+  using Dynamics = NcParams::Dynamics;
+  if (!at.letters().starts_with("DYN")) return false;
+  const std::array<std::pair<const char*, Dynamics>, 5> words{{{"DYNNORM", machine_.nc.dynamics},
+                                                               {"DYNPOS", Dynamics::fast},
+                                                               {"DYNROUGH", Dynamics::fast},
+                                                               {"DYNSEMIFIN", Dynamics::smooth},
+                                                               {"DYNFINISH", Dynamics::smooth}}};
+  for (const auto& [word, dynamics] : words) {
+    if (!at.take_word(word)) continue;
+    modal_.dynamics = dynamics;
     return true;
   }
   return false;

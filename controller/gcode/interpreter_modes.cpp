@@ -58,6 +58,21 @@ void ProgramRun::set_path_mode() {
     fail("P of G64 must be a tolerance from 0.00001 to 5 mm", words_.column('P'));
 }
 
+/// G5.1 Q1 R1 (speed) .. R10 (quality), as Fanuc's AI contour control has them.
+void ProgramRun::set_dynamics() {
+  using Dynamics = NcParams::Dynamics;
+  constexpr double kLevels = 10, kFastLevels = 5;
+  const int column = words_.column(GGroup::once);
+  words_.use("QRP");
+  if (!words_.has('Q')) fail("G5.1 without Q", column);
+  modal_.dynamics = machine_.nc.dynamics;
+  if (words_.value('Q') == 0 || !words_.has('R')) return;
+  const double level = words_.value('R');
+  if (!(level >= 1 && level <= kLevels && level == std::floor(level)))
+    fail("R of G5.1 must be a level from 1 (fast) to 10 (smooth)", words_.column('R'));
+  modal_.dynamics = level <= kFastLevels ? Dynamics::fast : Dynamics::smooth;
+}
+
 void ProgramRun::set_feed() {
   if (!words_.has('F')) {
     // Inverse time holds for one block only.
@@ -136,7 +151,9 @@ void ProgramRun::set_tool() {
   if (output >= 0) words_.use("PELQ");
   if (output == 66) input_ = 0;
   const int override = words_.code(MGroup::override);
+  if (override == 48 || override == 49) modal_.feed_override = override == 48;
   if (override >= 50) words_.use("P");
+  if (override == 50) modal_.feed_override = words_.value_or('P', 1) != 0;
   const int code = words_.code(MGroup::tool);
   if (code < 0) return;
   need_no_compensation("tool change", words_.column(MGroup::tool));
@@ -150,7 +167,7 @@ void ProgramRun::set_tool() {
   }
   tool_in_spindle_ = selected_tool_;
   modal_.spindle = 5;
-  emit(ProgramStop{true, line_number()});
+  emit(ProgramStop{true, line_number(), true});
 }
 
 void ProgramRun::set_tool_length() {
@@ -164,16 +181,17 @@ void ProgramRun::set_tool_length() {
   if (code == 490) {
     modal_.length = Length::none;
     modal_.tool_length = 0;
-    work_.tool = Vec3::Zero();
+    work_.tool.setZero();
     h_ = 0;
   } else {
     if (modal_.length == Length::rtcp || modal_.length == Length::vector)
       fail(fmt::format("{} while G43.4 is active; cancel with G49 first", name), column);
     if (code == 431) {
-      words_.use("XYZ");
-      for (const char c : std::string_view("XYZ"))
-        if (words_.has(c)) work_.tool[c - 'X'] = length(c);
-      if (!words_.any_of("XYZ")) fail("G43.1 without axis words", column);
+      words_.use(kAxisLetters);
+      for (std::size_t i = 0; i < kAxisCount; ++i)
+        if (words_.has(kAxisLetters[i]))
+          work_.tool[static_cast<Eigen::Index>(i)] = in_si(i, words_.value(kAxisLetters[i]));
+      if (!words_.any_axis()) fail("G43.1 without axis words", column);
       modal_.length = Length::offset;
     } else {
       words_.use("H");
@@ -193,7 +211,7 @@ void ProgramRun::set_tool_length() {
           need_no_compensation(name.c_str(), column);
           if (work_.g68_angle != 0 || work_.g5x().rotation != 0)
             fail(fmt::format("{} while coordinates are rotated; cancel with G69", name), column);
-          modal_.tool_length = entry.offset.z();
+          modal_.tool_length = entry.offset[kZ];
         }
       }
     }
@@ -262,7 +280,7 @@ MotionFrame ProgramRun::frame() const {
   if (!rtcp && !tilted_) return f;
   f.rtcp = true;
   f.p_MW = work_.g5x().shift.head<3>();
-  f.tool_length = rtcp ? modal_.tool_length : work_.tool.z();
+  f.tool_length = rtcp ? modal_.tool_length : work_.tool[kZ];
   if (tilted_) {
     f.tilt_origin = frame_.tilt_origin;
     f.tilt = frame_.tilt;
@@ -345,7 +363,7 @@ void ProgramRun::set_by_g10() {
     const std::size_t system = p == 0 ? work_.active : static_cast<std::size_t>(p - 1);
     WorkOffset offset = work_.systems[system];
     Coordinates machine = map_.to_axes(position_);
-    machine.head<3>() -= work_.tool;
+    machine -= work_.tool;
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       const char letter = kAxisLetters[i];
       const auto row = static_cast<Eigen::Index>(i);
@@ -368,7 +386,7 @@ void ProgramRun::set_by_g10() {
       probe.systems[system] = offset;
       probe.systems[system].shift = Coordinates::Zero();
       probe.select(system);
-      probe.tool = Vec3::Zero();
+      probe.tool.setZero();
       Coordinates words = work_.to_words(position_);
       if (system != work_.active) {
         probe.systems[system] = offset;
@@ -408,19 +426,20 @@ void ProgramRun::set_by_g10() {
     else if (l == 13)
       entry.diameter += 2 * r;
     else
-      entry.offset.z() = l == 11 ? entry.offset.z() + r : r;
+      entry.offset[kZ] = l == 11 ? entry.offset[kZ] + r : r;
   } else {
     ToolEntry& entry = tools_.entry(p);
     Coordinates here = map_.to_axes(position_);
-    here.head<3>() -= work_.tool;
-    if (l == 10) here = work_.to_words(position_), here.head<3>() += work_.tool;
+    here -= work_.tool;
+    if (l == 10) here = work_.to_words(position_) + work_.tool;
     // L11: as if G59.3 were active.
     if (l == 11) here -= work_.systems[8].shift;
-    for (const char c : std::string_view("XYZ"))
-      if (words_.has(c)) {
-        double& offset = entry.offset[c - 'X'];
-        offset = l == 1 ? length(c) : here[c - 'X'] - length(c);
-      }
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      if (!words_.has(kAxisLetters[i])) continue;
+      const auto row = static_cast<Eigen::Index>(i);
+      const double word = in_si(i, words_.value(kAxisLetters[i]));
+      entry.offset[row] = l == 1 ? word : here[row] - word;
+    }
     if (words_.has('R')) entry.diameter = 2 * length('R');
   }
 }

@@ -127,7 +127,9 @@ void ProgramRun::emit_motion() {
                                                      [&](char c) { return words_.has(c); }) -
                                         kAxisLetters.begin()) %
                                     kAxisCount]));
-  if (code >= 310)
+  if (code == 330 || code == 331)
+    emit_thread(code);
+  else if (code >= 310)
     emit_probe(code);
   else
     emit_straight(code);
@@ -174,15 +176,61 @@ void ProgramRun::emit_probe(int code) {
   move.kind = Move::Kind::line;
   move.probe = move.alone = true;
   set_move_feed(move);
+  move.panel = Move::Panel::fixed;
   emit_move(std::move(move));
   probed_ = work_.to_words(position_);
   probe_success_ = 1;
+}
+
+/// G33, G33.1: a line whose feed is K per turn of the spindle, at the speed that S gives it; what
+/// the operator does must not part them. G33.1 taps: it goes back as it came, the spindle reversed.
+void ProgramRun::emit_thread(int code) {
+  const std::string name = code_name(code);
+  const int column = words_.column(GGroup::motion);
+  need_no_compensation(name.c_str(), column);
+  words_.use("K");
+  if (!words_.has('K')) fail(name + " without K (the way per turn)", column);
+  if (!(length('K') > 0))
+    fail(fmt::format("K{:g} of {}: allowed is more than 0", words_.value('K'), name),
+         words_.column('K'));
+  if (modal_.spindle != 3 && modal_.spindle != 4)
+    fail(name + " with the spindle at rest; M3 or M4 first", column);
+  if (!(modal_.spindle_speed > 0)) fail(name + " without S", column);
+  if (words_.any_of("AC")) fail(name + " with A or C; allowed are X Y Z", column);
+  Move move;
+  move.start = position_;
+  move.end = target();
+  const Coordinates way = move.end - move.start;
+  if (way.isZero(0)) fail(name + " ends where it starts", column);
+  move.kind = Move::Kind::line;
+  move.feed_mode = Move::Feed::tip;
+  move.feed_per_turn = length('K');
+  move.feed = move.feed_per_turn * modal_.spindle_speed / (2 * kPi);
+  move.panel = Move::Panel::locked;
+  move.alone = code == 331;
+  for (std::size_t i = 0; i < 3 && !options_.bare && !frame_.rtcp; ++i) {
+    const double most = machine_.axes[i].limits.velocity;
+    const double needed = move.feed * std::abs(way[static_cast<Eigen::Index>(i)]) / way.norm();
+    if (needed > most)
+      fail(fmt::format("{}: at this S and K {} would need {:.0f} mm/min; allowed is {:.0f}", name,
+                       kAxisNames[i], needed * 60e3, most * 60e3),
+           column);
+  }
+  const Coordinates start = move.start, end = move.end;
+  emit_move(move);
+  if (code == 330) return;
+  cycle_spindle(modal_.spindle == 3 ? 4 : 3);
+  move.start = end;
+  move.end = start;
+  emit_move(move);
+  cycle_spindle(modal_.spindle);
 }
 
 void ProgramRun::set_move_feed(Move& move) const {
   if (!(modal_.linear_feed > 0))
     fail(fmt::format("{} without F{}", code_name(modal_.motion),
                      modal_.feed == 930 ? "; under G93 every block needs its own" : ""));
+  if (!modal_.feed_override) move.panel = Move::Panel::fixed;
   const Coordinates way = move.end - move.start;
   double tip = way.head<3>().norm();
   if (move.kind == Move::Kind::arc) {
@@ -341,6 +389,7 @@ void ProgramRun::emit_tool_align() {
   if (move.start != move.end) {
     move.exact = modal_.exact;
     move.tolerance = modal_.tolerance;
+    move.dynamics = modal_.dynamics;
     move.line = line_number();
     emit(move);
   }
@@ -351,6 +400,7 @@ void ProgramRun::emit_move(Move move) {
   move.frame = frame_;
   move.exact = modal_.exact;
   move.tolerance = modal_.tolerance;
+  move.dynamics = modal_.dynamics;
   move.line = line_number();
   position_ = move.end;
   if (move.start == move.end && move.kind != Move::Kind::arc) return;

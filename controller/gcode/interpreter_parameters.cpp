@@ -55,6 +55,70 @@ double* ProgramRun::system_value(int number, double& to_si) {
   return nullptr;
 }
 
+// ------------------------------------------------------------------------------- what is kept
+
+/// An offset or reference under its number in NcData [m, rad]; null: none.
+double* ProgramRun::kept_value(int number) {
+  const auto of = [](Coordinates& x, int n) {
+    const Eigen::Index row = ngc_axis(n);
+    return row < 0 ? nullptr : &x[row];
+  };
+  if (number >= 5161 && number <= 5169) return of(home_, number - 5161);
+  if (number >= 5181 && number <= 5189) return of(second_home_, number - 5181);
+  if (number >= 5211 && number <= 5219) return of(work_.g92_kept, number - 5211);
+  if (number < 5221 || number > 5390) return nullptr;
+  WorkOffset& offset = work_.systems[static_cast<std::size_t>((number - 5221) / 20)];
+  const int n = (number - 5221) % 20;
+  return n == 9 ? &offset.rotation : n < 9 ? of(offset.shift, n) : nullptr;
+}
+
+std::map<int, double> ProgramRun::offset_parameters() const {
+  std::map<int, double> values;
+  for (int number = 5161; number <= 5390; ++number)
+    if (const double* value = const_cast<ProgramRun*>(this)->kept_value(number))
+      values[number] = *value;
+  values[5210] = ended_ || work_.g92.isZero(0) ? 0 : 1;
+  return values;
+}
+
+void ProgramRun::take_over(const NcData& data) {
+  begin_offsets_ = offset_parameters();
+  begin_tools_ = tools_.all();
+  const KeptParameters own = kept_parameters(fanuc_);
+  for (const auto& [number, value] : data.parameters) {
+    if (double* offset = kept_value(number))
+      *offset = value;
+    else if (number >= own.first && number <= own.last)
+      parameters_.write(number, value);
+  }
+  const auto active = data.parameters.find(5210);
+  if (active != data.parameters.end() && active->second != 0) work_.g92 = work_.g92_kept;
+  for (const auto& [number, tool] : data.tools) tools_.entry(number) = tool;
+}
+
+NcData ProgramRun::data() const {
+  NcData data = options_.data;
+  for (const auto& [number, value] : offset_parameters())
+    if (data.parameters.contains(number) || begin_offsets_.at(number) != value)
+      data.parameters[number] = value;
+  const KeptParameters own = kept_parameters(fanuc_);
+  for (int number = own.first; number <= own.last; ++number) {
+    const double value = parameters_.read(number);
+    if (!std::isfinite(value))
+      data.parameters.erase(number);
+    else
+      data.parameters[number] = value;
+  }
+  for (const auto& [number, tool] : tools_.all()) {
+    const auto begin = begin_tools_.find(number);
+    const bool changed = begin == begin_tools_.end() || !(begin->second == tool);
+    if (number > 0 && (changed || data.tools.contains(number)) &&
+        (data.tools.size() < NcData::kMostTools || data.tools.contains(number)))
+      data.tools[number] = tool;
+  }
+  return data;
+}
+
 std::optional<double> ProgramRun::read(int number) const {
   if (number < 2000) return std::nullopt;
   double to_si = 1;
@@ -92,7 +156,7 @@ std::optional<double> ProgramRun::read(int number) const {
   }
   if (number >= 5401 && number <= 5409) {
     const Eigen::Index row = ngc_axis(number - 5401);
-    return row >= 0 && row < 3 ? work_.tool[row] / modal_.length_unit : 0;
+    return row < 0 ? 0 : in_words(work_.tool, row);
   }
   if (number >= 5420 && number <= 5428) return position(number - 5420);
   if (!fanuc_) return std::nullopt;
@@ -102,7 +166,7 @@ std::optional<double> ProgramRun::read(int number) const {
   if (number >= 5021 && number <= 5025) return in_words(map_.to_axes(position_), number - 5021);
   if (number > 2000 && number <= 2200) {
     const ToolEntry* tool = tools_.find(number - 2000);
-    return tool ? tool->offset.z() / modal_.length_unit : 0;
+    return tool ? tool->offset[kZ] / modal_.length_unit : 0;
   }
   const auto tenths = [](int code) { return code / 10.0; };
   switch (number) {
@@ -155,7 +219,7 @@ bool ProgramRun::write(int number, double value) {
     return true;
   }
   if (fanuc_ && number > 2000 && number <= 2200) {
-    tools_.entry(number - 2000).offset.z() = value * modal_.length_unit;
+    tools_.entry(number - 2000).offset[kZ] = value * modal_.length_unit;
     return true;
   }
   const bool read_only =

@@ -27,6 +27,7 @@ struct GcodeModal {
   int feed = 940;
   bool exact = false;
   double tolerance = 0;
+  NcParams::Dynamics dynamics = NcParams::Dynamics::smooth;
   bool to_initial = true;       ///< G98
   bool constant_speed = false;  ///< G96
   Length length = Length::none;
@@ -34,6 +35,7 @@ struct GcodeModal {
   double linear_feed = 0, rotary_feed = 0;  ///< [m/s], [rad/s] (G93: 1/s; G95: m per turn); 0: none
   double spindle_speed = 0;                 ///< [rad/s]
   int spindle = 5;                          ///< M3, M4, M5, M19
+  bool feed_override = true;                ///< M48, M50
 };
 
 /// R, Z, Q, P of canned cycles hold while cycles follow each other.
@@ -47,6 +49,11 @@ class ProgramRun : public SystemParameters {
  public:
   ProgramRun(const std::string& path, const Machine& machine, InterpreterOptions options);
   Block next();
+  BlockStart run_to(int line);
+  long passes_of(int line);
+  NcData data() const;
+  bool inches() const { return modal_.length_unit != 1e-3; }
+  void block_delete(bool on) { options_.block_delete = on; }
 
  private:
   using Dialect = InterpreterOptions::Dialect;
@@ -76,6 +83,8 @@ class ProgramRun : public SystemParameters {
 
   // reading: interpreter.cpp
   void read_line();
+  void read_guarded();
+  bool about_to_read(int line) const;
   bool read_words(Cursor& at);
   void read_letter(Cursor& at);
   bool read_keyword(Cursor& at);
@@ -102,6 +111,8 @@ class ProgramRun : public SystemParameters {
   void jump_to_label(double number, int column);
   void execute_macro_words();
   std::size_t find_unit(const std::vector<std::string>& names);
+  std::vector<std::string> program_folders() const;
+  std::string where_sought() const;
   void enter_call(Call call, std::size_t unit, const ProgramPlace& place);
   void leave_call();
   double condition(Cursor& at);
@@ -109,6 +120,8 @@ class ProgramRun : public SystemParameters {
   // modes: interpreter_modes.cpp
   void set_modes();
   void set_path_mode();
+  void set_dynamics();
+  bool take_dynamics(Cursor& at);
   void set_feed();
   void set_spindle();
   void set_tool();
@@ -130,6 +143,7 @@ class ProgramRun : public SystemParameters {
   void emit_straight(int code);
   void emit_arc();
   void emit_probe(int code);
+  void emit_thread(int code);
   void emit_reference_return(int code);
   void emit_tool_align();
   void emit_dwell();
@@ -156,6 +170,9 @@ class ProgramRun : public SystemParameters {
   std::optional<double> read(std::string_view name) const override;
   bool write(int number, double value) override;
   double* system_value(int number, double& to_si);
+  double* kept_value(int number);
+  std::map<int, double> offset_parameters() const;
+  void take_over(const NcData& data);
 
   const Machine machine_;
   InterpreterOptions options_;
@@ -183,6 +200,8 @@ class ProgramRun : public SystemParameters {
   std::optional<GcodeModal> saved_;  ///< M70 outside every call
   WorkCoordinates work_;
   ToolTable tools_;
+  std::map<int, double> begin_offsets_;  ///< of the machine file
+  std::map<int, ToolEntry> begin_tools_;
   int selected_tool_ = 0, tool_in_spindle_ = 0, h_ = 0, d_ = 0;
   Coordinates home_, second_home_;  ///< G28, G30 [m, rad]
   Coordinates probed_ = Coordinates::Zero();

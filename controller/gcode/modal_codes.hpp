@@ -9,7 +9,7 @@ namespace vcnc {
 enum class GGroup : std::uint8_t {
   unknown,
   once,          ///< acts in its block only: G4 G10 G28 G30 G52 G53 G65 G92 ...
-  motion,        ///< G0 G1 G2 G3 G31 G38.n G73 G74 G76 G80 .. G89
+  motion,        ///< G0 G1 G2 G3 G31 G33 G33.1 G38.n G73 G74 G76 G80 .. G89
   plane,         ///< G17 G18 G19
   distance,      ///< G90 G91
   arc_distance,  ///< G90.1 G91.1

@@ -36,11 +36,17 @@ int read_tool(std::string_view line, double length_unit, ToolEntry& tool) {
       case 'Z':
         tool.offset[letter - 'X'] = value * length_unit;
         break;
+      case 'A':
+        tool.offset[kA] = value * kDegree;
+        break;
+      case 'C':
+        tool.offset[kC] = value * kDegree;
+        break;
       case 'D':
         tool.diameter = value * length_unit;
         break;
       default:
-        if (std::string_view("PABCUVWIJQ").find(letter) == std::string_view::npos)
+        if (std::string_view("PBUVWIJQ").find(letter) == std::string_view::npos)
           throw LineError(
               fmt::format("unknown word {}; a tool has T P X Y Z A B C U V W D I J Q", letter),
               column);
@@ -54,13 +60,16 @@ int read_tool(std::string_view line, double length_unit, ToolEntry& tool) {
 ToolTable::ToolTable(const Machine& machine) {
   for (int h = 1;; ++h) {
     try {
-      tools_[h].offset = Vec3(0, 0, machine.tool_length(h));
+      tools_[h].offset[kZ] = machine.tool_length(h);
     } catch (const std::out_of_range&) {
       tools_.erase(h);
       break;
     }
   }
-  tools_[1].diameter = 2 * machine.probe.ball_radius;
+  const std::vector<double>& diameters = machine.setup.tool_diameter;
+  for (std::size_t d = 0; d < diameters.size(); ++d)
+    tools_[static_cast<int>(d) + 1].diameter = diameters[d];
+  if (diameters.empty()) tools_[1].diameter = 2 * machine.probe.ball_radius;
 }
 
 ToolTable ToolTable::read(const std::string& path, double length_unit) {
@@ -79,6 +88,20 @@ ToolTable ToolTable::read(const std::string& path, double length_unit) {
     }
   }
   return table;
+}
+
+std::string ToolTable::to_text(double length_unit) const {
+  std::string text;
+  for (const auto& [number, tool] : tools_) {
+    text += fmt::format("T{} P{}", number, number);
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      const double x = tool.offset[static_cast<Eigen::Index>(i)];
+      if (x != 0 || i == kZ)
+        text += fmt::format(" {}{:.9g}", kAxisNames[i], x / (is_rotary(i) ? kDegree : length_unit));
+    }
+    text += fmt::format(" D{:.9g}\n", tool.diameter / length_unit);
+  }
+  return text;
 }
 
 const ToolEntry* ToolTable::find(int number) const {

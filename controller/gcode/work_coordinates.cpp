@@ -24,10 +24,10 @@ Coordinates WorkCoordinates::to_frame(const Coordinates& word) const {
   x += g92;
   if (!rtcp && g5x_.rotation != 0) turn(x, g5x_.rotation);
   if (rtcp) {
-    x.tail<2>() += g5x_.shift.tail<2>();
+    x.tail<2>() += g5x_.shift.tail<2>() + tool.tail<2>();
   } else {
     x += g5x_.shift;
-    x.head<3>() += tool;
+    x += tool;
   }
   return x;
 }
@@ -35,9 +35,10 @@ Coordinates WorkCoordinates::to_frame(const Coordinates& word) const {
 Coordinates WorkCoordinates::to_words(const Coordinates& frame) const {
   Coordinates x = frame;
   if (rtcp) {
+    x.tail<2>() -= tool.tail<2>();
     x.tail<2>() -= g5x_.shift.tail<2>();
   } else {
-    x.head<3>() -= tool;
+    x -= tool;
     x -= g5x_.shift;
   }
   if (!rtcp && g5x_.rotation != 0) turn(x, -g5x_.rotation);

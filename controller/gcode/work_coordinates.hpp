@@ -2,7 +2,8 @@
 //
 //   without RTCP   axis   = Rz(rho) (c + Rz(theta) (word - c) + g92) + g5x + tool
 //   with RTCP      point  = word + g92          in the workpiece at g5x
-// rho: rotation of the work offset (G10 L2 R), theta about c: G68. Rotary axes: word + g92 + g5x.
+// rho: rotation of the work offset (G10 L2 R), theta about c: G68. Rotary axes: word + g92 + g5x +
+// tool.
 // Source of the order: LinuxCNC, emc/task/emccanon.cc, rotate_and_offset_pos.
 #pragma once
 
@@ -25,7 +26,7 @@ class WorkCoordinates {
   std::size_t active = 0;
   Coordinates g92 = Coordinates::Zero();
   Coordinates g92_kept = Coordinates::Zero();  ///< of G92.2, for G92.3
-  Vec3 tool = Vec3::Zero();                    ///< offset of the active tool [m]
+  Coordinates tool = Coordinates::Zero();      ///< offset of the active tool [m, rad]
   bool rtcp = false;                           ///< g5x and tool belong to the frame
   double g68_angle = 0;
   Eigen::Vector2d g68_centre = Eigen::Vector2d::Zero();
@@ -42,8 +43,8 @@ class WorkCoordinates {
   Coordinates to_words(const Coordinates& x) const;
   /// One coordinate, where nothing is rotated.
   double to_frame(double word, Eigen::Index i) const {
-    double x = word + g92[i];
-    if (i >= 3) return x + g5x_.shift[i];
+    const double x = word + g92[i];
+    if (i >= 3) return x + g5x_.shift[i] + tool[i];
     return rtcp ? x : x + g5x_.shift[i] + tool[i];
   }
 

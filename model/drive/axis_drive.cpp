@@ -83,7 +83,11 @@ AxisDrive::AxisDrive(const AxisParams& declared, const AxisParams& actual, const
       last_shaped_(setpoint_),
       observer_(observer_bandwidth(declared.servo), inertia_, encoder(actual.limits.start)) {
   axis_chain<ServoPort>(effects, axis, seed).step(servo_, {});
-  kp_ = 2 * kPi * actual.servo.velocity_bandwidth * inertia_ * servo_.velocity_gain;
+  const double crossover = 2 * kPi * actual.servo.velocity_bandwidth;
+  kp_ = actual.servo.velocity_gain > 0 ? actual.servo.velocity_gain : crossover * inertia_;
+  kp_ *= servo_.velocity_gain;
+  if (actual.servo.controller == ServoParams::Controller::sampled)
+    sampled_.emplace(kp_, inertia_, actual.servo.dead_time, encoder(actual.limits.start));
   lag_share_ = servo_.current_lag > 0 ? -std::expm1(-kPlantTime / servo_.current_lag) : 1;
   TransmissionPort::Signal<double> transmission{.damping_ratio = 0.05};
   axis_chain<TransmissionPort>(effects, axis, seed).step(transmission, {});
@@ -219,10 +223,11 @@ AxisCycle AxisDrive::run(const Course& course) {
     if (laws_) update_motions(0);
     AxisSetpoint next = course[i + 1];
     if (shape) next = shaped(next, (next.velocity - course[i].velocity) / kDriveLoopTime, 1);
-    force_ref_ = control(now, next);
+    if (!sampled_) force_ref_ = control(now, next);
     const double velocity_before = v_load_;
     double mean_force = 0;
     for (plant_step_ = 0; plant_step_ < kPlantStepsPerLoop; ++plant_step_) {
+      if (sampled_) force_ref_ = force_demanded();
       force_ += lag_share_ * (force_ref_ - force_);
       mean_force += force_ / kPlantStepsPerLoop;
       move_plant();
@@ -237,7 +242,8 @@ AxisCycle AxisDrive::run(const Course& course) {
   const double motor = encoder(x_motor_), load = encoder(x_load_);
   cycle.measured = feedback_ == ServoParams::Feedback::motor ? motor : load;
   cycle.second = load - motor;
-  cycle.force = force_ / declared_.force_limit;
+  if (sampled_) sampled_->sample(servo_, now.position, now.velocity, cycle.measured);
+  cycle.force = (sampled_ ? sampled_->demand() : force_) / declared_.force_limit;
   cycle.velocity = observer_.velocity();
   return cycle;
 }
@@ -251,6 +257,11 @@ double AxisDrive::control(const AxisSetpoint& now, const AxisSetpoint& next) {
   const double limited = std::clamp(force, -servo_.force_limit, servo_.force_limit);
   if (force == limited) integral_ += kp_ / servo_.integral_time * error * kDriveLoopTime;
   return limited;
+}
+
+/// What the sampled controller's force is on average over the current plant step.
+double AxisDrive::force_demanded() const {
+  return sampled_->force(loop_ * kDriveLoopTime + plant_step_ * kPlantTime, kPlantTime);
 }
 
 void AxisDrive::move_plant() {

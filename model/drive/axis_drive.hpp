@@ -17,6 +17,10 @@
 // smooth motion it has no lag, because it knows the force, and it keeps the steps of a coarse
 // encoder out of the force.
 //
+// That is the controller "cascade". A "sampled" one closes its loops once per cycle, at its end,
+// with a dead time (model/drive/sampled_controller.hpp); the force it reports is the one it
+// demands.
+//
 // Every 50 us (plant step), after a first-order lag tau_i of the force:
 //   rigid (compliance 0, gap 0):   J x'' = F - F_f(x')
 //   two masses:  m_r x_m'' = F - F_s,   m x'' = F_s - F_f(x')
@@ -41,8 +45,10 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "model/drive/friction.hpp"
+#include "model/drive/sampled_controller.hpp"
 #include "model/effects/chain.hpp"
 #include "model/machine.hpp"
 
@@ -62,7 +68,7 @@ struct AxisSetpoint {
 struct AxisCycle {
   double measured = 0;  ///< position by the measuring system at the end of the cycle
   double second = 0;    ///< load side minus motor side at the end of the cycle
-  double force = 0;     ///< drive force at the end, share of the limit
+  double force = 0;     ///< drive force at the end (sampled: demanded), share of the limit
   double velocity = 0;  ///< measured velocity at the end
   std::array<double, kDriveLoopSteps> truth{};  ///< true load position at the end of each loop step
 };
@@ -120,6 +126,7 @@ class AxisDrive {
   AxisCycle run(const Course& course);
   AxisSetpoint shaped(const AxisSetpoint& setpoint, double acceleration, int step);
   double control(const AxisSetpoint& now, const AxisSetpoint& next);
+  double force_demanded() const;
   void move_plant();
   void move_rigid(double force, double load_force);
   void move_two_masses(double force, double load_force);
@@ -165,6 +172,7 @@ class AxisDrive {
   Motions<double> motions_{};
   Friction friction_;
   VelocityObserver observer_;
+  std::optional<SampledController> sampled_;  ///< in place of the cascade
 };
 
 }  // namespace vcnc

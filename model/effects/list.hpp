@@ -39,6 +39,7 @@
 #include "model/effects/friction_asymmetry.hpp"
 #include "model/effects/friction_fade.hpp"
 #include "model/effects/friction_zone.hpp"
+#include "model/effects/grease_drag.hpp"
 #include "model/effects/integral_time_error.hpp"
 #include "model/effects/kv_error.hpp"
 #include "model/effects/lateral_play.hpp"
@@ -105,8 +106,8 @@ using AllEffects = EffectList<
     // transmission
     Windup, Backlash,
     // friction: terms first, then what changes them
-    Coulomb, Stribeck, Viscous, NonlinearViscous, Presliding, FrictionAsymmetry, FrictionZone,
-    FrictionFade,
+    Coulomb, Stribeck, GreaseDrag, Viscous, NonlinearViscous, Presliding, FrictionAsymmetry,
+    FrictionZone, FrictionFade,
     // further forces on the load
     WeightImbalance, CableChain,
     // tool centre against scale

@@ -138,7 +138,7 @@ TEST(Layering, BannedConstructs) {
 
 TEST(Layering, HeavyHeadersStayInOneSourceFile) {
   const std::map<std::string, std::size_t> limit{
-      {"toml++/toml.h", 1}, {"CLI/CLI.hpp", 3}, {"nlohmann/json.hpp", 1}, {"hdf5.h", 1}};
+      {"toml++/toml.h", 1}, {"CLI/CLI.hpp", 3}, {"nlohmann/json.hpp", 2}, {"hdf5.h", 1}};
   std::map<std::string, std::set<std::string>> users;
   for (const Source& source : sources())
     for (const std::string& header : includes(source)) users[header].insert(source.path);

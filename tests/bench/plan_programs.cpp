@@ -27,7 +27,9 @@ class Text {
   Text& xyz(double x_mm, double y_mm, double z_mm, const std::string& more = "") {
     return line(fmt::format("X{:.5f} Y{:.5f} Z{:.5f}{}", x_mm, y_mm, z_mm, more));
   }
-  PlanProgram done(const std::string& name) const { return {name, text_ + "M30\n", kTolerance}; }
+  PlanProgram done(const std::string& name, bool corners = false) const {
+    return {name, text_ + "M30\n", kTolerance, corners};
+  }
 
  private:
   std::string text_;
@@ -47,7 +49,7 @@ PlanProgram square_spiral() {
     (i % 2 ? y : x) += i % 4 < 2 ? side : -side;
     text.xyz(x, y, 0);
   }
-  return text.done("square spiral");
+  return text.done("square spiral", true);
 }
 
 /// Lines that meet at sharp angles.
@@ -58,7 +60,7 @@ PlanProgram star() {
     const double angle = i * 2 * kPi * 17 / 35;
     text.xyz(40 * (1 - std::cos(angle)), 40 * std::sin(angle), 0);
   }
-  return text.done("star");
+  return text.done("star", true);
 }
 
 /// Slots: lines joined by half circles.
@@ -114,7 +116,7 @@ PlanProgram corners() {
     z = uniform(-3, 3);
     text.xyz(x, y, z);
   }
-  return text.done("random corners");
+  return text.done("random corners", true);
 }
 
 PlanProgram tip_at_rest() {

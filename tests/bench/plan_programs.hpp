@@ -12,6 +12,7 @@ namespace vcnc {
 struct PlanProgram {
   std::string name, text;
   double tolerance = 0;  ///< G64 P [m]
+  bool corners = false;  ///< lines that meet at corners, all of them
 };
 
 /// X, Y, Z: 500 mm/s, 5000 mm/s2, 50,000 mm/s3.

@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 
 #include "bus/tick.hpp"
 #include "controller/limit_use.hpp"
 #include "controller/planner.hpp"
 #include "tests/bench/plan_programs.hpp"
-#include "tests/bench/stopwatch.hpp"
 #include "tests/bench/time_bound.hpp"
 #include "tests/controller/program_file.hpp"
 
@@ -42,12 +42,15 @@ double deviation(const Vec3& tip, const std::vector<Move>& moves, std::size_t ne
   return least;
 }
 
-void measure(const PlanProgram& program, const Machine& machine) {
+const char* only = nullptr;  ///< part of the name of the programs to measure
+
+void measure(const PlanProgram& program, const Machine& machine, NcParams::Dynamics dynamics) {
   std::vector<Move> moves = read_moves(program.text, machine);
   std::erase_if(moves, [](const Move& move) { return move.kind == Move::Kind::rapid; });
-  const Stopwatch planning;
+  for (Move& move : moves) move.dynamics = dynamics;
+  const std::clock_t begin = std::clock();  // of this thread alone: others may be busy
   const Trajectory run(Path(moves, machine.nc.angle_tolerance), machine);
-  const double planning_s = planning.seconds();
+  const double planning_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
 
   const FrameMap map(machine.kinematics, run.path().frame());
   LimitUse use(machine, run.at(0).q);
@@ -62,23 +65,35 @@ void measure(const PlanProgram& program, const Machine& machine) {
     off = std::max(off, deviation(tip, moves, near));
   }
   const double bound = time_bound(run.path(), machine);
-  fmt::print("{:<20}{:9.3f}{:9.3f}{:7.2f}   {:5.3f} {:5.3f} {:5.3f}{:9.3f}{:10.4f}\n", program.name,
+  fmt::print("{:<20}{:9.3f}{:9.3f}{:7.2f}   {:5.3f} {:5.3f} {:5.3f}{:9.3f}{:10.4f}", program.name,
              run.duration(), bound, run.duration() / bound, use.largest(1), use.largest(2),
              use.largest(3), off * 1e6, planning_s / run.duration());
+  if (program.corners)
+    fmt::print("{:10.3f}{:10.3f}", trapezoid_time(moves, machine),
+               time_with_stops(moves, machine, true));
+  fmt::print("{}\n", run.given_up() > 0 ? "  smooth in parts" : "");
   std::fflush(stdout);
 }
 
 void measure_all(const char* title, const std::vector<PlanProgram>& programs,
-                 const Machine& machine) {
-  fmt::print("{}\n{:<20}{:>9}{:>9}{:>7}   {:<17}{:>9}{:>10}\n", title, "", "time s", "bound s",
-             "ratio", "use of v, a, j", "off um", "plan s/s");
-  for (const PlanProgram& program : programs) measure(program, machine);
+                 const Machine& machine, NcParams::Dynamics dynamics) {
+  fmt::print("{}\n{:<20}{:>9}{:>9}{:>7}   {:<17}{:>9}{:>10}{:>10}{:>10}\n", title, "", "time s",
+             "bound s", "ratio", "use of v, a, j", "off um", "plan s/s", "trapez. s", "stops s");
+  for (const PlanProgram& program : programs)
+    if (!only || program.name.find(only) != std::string::npos) measure(program, machine, dynamics);
 }
 
 }  // namespace
 }  // namespace vcnc
 
-int main() {
-  vcnc::measure_all("three axes", vcnc::three_axis_programs(), vcnc::three_axis_machine());
-  vcnc::measure_all("five axes", vcnc::five_axis_programs(), vcnc::five_axis_machine());
+int main(int argc, char** argv) {
+  if (argc > 1) vcnc::only = argv[1];
+  using Dynamics = vcnc::NcParams::Dynamics;
+  for (const Dynamics dynamics : {Dynamics::smooth, Dynamics::fast}) {
+    const std::string name = dynamics == Dynamics::fast ? "fast" : "smooth";
+    vcnc::measure_all((name + ", three axes").c_str(), vcnc::three_axis_programs(),
+                      vcnc::three_axis_machine(), dynamics);
+    vcnc::measure_all((name + ", five axes").c_str(), vcnc::five_axis_programs(),
+                      vcnc::five_axis_machine(), dynamics);
+  }
 }

@@ -97,4 +97,64 @@ double time_bound(const Path& path, const Machine& machine, double steps_per_wid
   return time;
 }
 
+namespace {
+
+/// Limits along a straight move of X, Y, Z.
+struct LineLimits {
+  double length, velocity, acceleration, jerk;
+  Vec3 direction;
+};
+
+LineLimits line_limits(const Move& move, const Machine& machine) {
+  const Vec3 way = (move.end - move.start).head<3>();
+  LineLimits line{way.norm(), move.feed, 1e9, 1e9, way.normalized()};
+  for (const std::size_t i : {kX, kY, kZ}) {
+    const double share = std::abs(line.direction[static_cast<Eigen::Index>(i)]);
+    if (share < 1e-9) continue;
+    const AxisLimits& axis = machine.axes[i].limits;
+    line.velocity = std::min(line.velocity, axis.velocity / share);
+    line.acceleration = std::min(line.acceleration, axis.acceleration / share);
+    line.jerk = std::min(line.jerk, axis.jerk / share);
+  }
+  return line;
+}
+
+double rest_to_rest(const LineLimits& line, bool with_jerk) {
+  const double l = line.length, v = line.velocity, a = line.acceleration, j = line.jerk;
+  if (!with_jerk) return l >= v * v / a ? l / v + v / a : 2 * std::sqrt(l / a);
+  const double ramp = a / j;  // time in which the acceleration rises
+  if (v >= a * ramp) {
+    if (l >= v * (v / a + ramp)) return l / v + v / a + ramp;
+    if (l >= 2 * a * ramp * ramp) return ramp + std::sqrt(ramp * ramp + 4 * l / a);
+  } else if (l >= 2 * v * std::sqrt(v / j)) {
+    return l / v + 2 * std::sqrt(v / j);
+  }
+  return 4 * std::cbrt(l / (2 * j));
+}
+
+}  // namespace
+
+double time_with_stops(const std::vector<Move>& moves, const Machine& machine, bool with_jerk) {
+  double time = 0;
+  for (const Move& move : moves) time += rest_to_rest(line_limits(move, machine), with_jerk);
+  return time;
+}
+
+double trapezoid_time(const std::vector<Move>& moves, const Machine& machine) {
+  double time = time_with_stops(moves, machine, false);
+  for (std::size_t i = 1; i < moves.size(); ++i) {
+    const LineLimits from = line_limits(moves[i - 1], machine), to = line_limits(moves[i], machine);
+    const double theta = 0.5 * std::acos(std::clamp(-from.direction.dot(to.direction), -1.0, 1.0));
+    const double a = std::min(from.acceleration, to.acceleration);
+    // No faster than the peaks of either move.
+    const double most =
+        std::min({from.velocity, to.velocity, std::sqrt(from.acceleration * from.length),
+                  std::sqrt(to.acceleration * to.length)});
+    const double v =
+        std::min(most, 2 * std::sqrt(a * moves[i].tolerance / std::max(std::cos(theta), 1e-9)));
+    time -= v / a;
+  }
+  return time;
+}
+
 }  // namespace vcnc

@@ -90,6 +90,16 @@ TEST(FrictionEffects, PreslidingIsASpringThatBends) {
   }
 }
 
+TEST(FrictionEffects, GreaseDragRisesToItsLimit) {
+  const GreaseDrag drag{.level = 200, .velocity = 5e-3};
+  EXPECT_NEAR(force_at(kX, 5e-3, drag), 152.31883119115297, kLevel);     // tanh 1
+  EXPECT_NEAR(force_at(kX, -10e-3, drag), -192.80551601516339, kLevel);  // tanh 2
+  EXPECT_NEAR(force_at(kX, 0.2, Coulomb{50}, drag), 250, kLevel);
+  EXPECT_NEAR(force_at(kX, 1e-5, drag) / 1e-5, 200 / 5e-3, 2);  // viscous near rest
+  EXPECT_NEAR(force_at(kC, 0.05, GreaseDrag{.level = 5, .velocity = 0.05}), 3.807970779778824,
+              kLevel);
+}
+
 TEST(FrictionEffects, NonlinearViscousIsAPowerOfTheSpeed) {
   // 200 N at 100 mm/s; at 25 mm/s 200/2 (root), 200/16 (square), 200/64 (cube).
   const auto force = [](double v, double n) {

@@ -4,6 +4,7 @@
 // Whatever they hold: a slot that counts is written back with the same bytes, the one that does not
 // is the one to be overwritten, and a state that decodes is written back with the same bytes.
 #include "bus/memory_slot.hpp"
+#include "controller/gcode/nc_data.hpp"
 #include "controller/nc_record.hpp"
 #include "fuzz.hpp"
 #include "probe_sim/overtravel_node.hpp"
@@ -20,6 +21,9 @@ void check_state(Bytes state) {
   if (const auto record = decode_record(state)) {
     fuzz::require(same(encode_record(*record), state));
     fuzz::require(text_of(record->stage)[0] != 0);
+  }
+  if (const auto data = decode_nc_data(state)) {
+    fuzz::require(same(encode_nc_data(*data), state));
   }
   if (const auto locked = decode_spindle_lock(state))
     fuzz::require(same(encode_spindle_lock(*locked), state));

@@ -261,6 +261,11 @@ const std::map<std::string, Check>& checks() {
        [](const Shown& s) {
          near(s.exponent([](const Curve& c) { return peak_to_peak(c); }), 0.5, 0.06);
        }},
+      {"grease_drag",
+       [](const Shown& s) {  // at its limit at every feed
+         near(peak_to_peak(s.off.back()), 2 * 200, 0.1);
+         EXPECT_NEAR(s.exponent([](const Curve& c) { return peak_to_peak(c); }), 0, 0.06);
+       }},
       {"presliding",
        [](const Shown& s) {  // half turned over after ln 2 Fc / sigma0 = 6.9 um
          near(travel_to_turn(s.with, s.d.with.passes.front(), kX), std::log(2.0) * 250 / 2.5e7,

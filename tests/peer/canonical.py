@@ -146,6 +146,11 @@ class Rs274Reader:
             self.feed, self.feed_unit = n[0], self.unit
         elif name == "SET_FEED_MODE":
             self.per_revolution = n[1] != 0
+        elif name.startswith("START_SPEED_FEED_SYNC"):
+            self.synchronised = (self.feed, self.feed_unit, self.per_revolution)
+            self.feed, self.feed_unit, self.per_revolution = n[0], self.unit, True
+        elif name == "STOP_SPEED_FEED_SYNCH":
+            self.feed, self.feed_unit, self.per_revolution = self.synchronised
         elif name == "STRAIGHT_TRAVERSE":
             self._move("rapid", self._five(n), text)
         elif name == "STRAIGHT_FEED":

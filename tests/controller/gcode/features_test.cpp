@@ -1,5 +1,6 @@
 // What the words do, against values computed by hand.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -17,8 +18,10 @@ namespace {
 InterpreterOptions bare() {
   InterpreterOptions options;
   ToolTable tools;
-  tools.entry(1) = {Vec3(0, 0, 0.05), 0.010};
-  tools.entry(2) = {Vec3(0.001, -0.002, 0.1), 0.004};
+  tools.entry(1).offset[kZ] = 0.05;
+  tools.entry(1).diameter = 0.010;
+  tools.entry(2).offset << 0.001, -0.002, 0.1, 0, 0;
+  tools.entry(2).diameter = 0.004;
   options.tools = tools;
   options.bare = true;
   return options;
@@ -400,6 +403,86 @@ TEST(GcodeTools, TableOfLinuxCnc) {
   EXPECT_EQ(table.find(2), nullptr);
   const ProgramFile wrong("T1 Z1\nT1 Z2\n");
   EXPECT_THROW(ToolTable::read(wrong.path(), 1e-3), ProgramError);
+}
+
+// --------------------------------------------------------------- threads, back boring, overrides
+
+// K per turn at S: v = K S / 60, along the way.
+TEST(GcodeThreads, RunAtTheFeedOfTheSpindle) {
+  const auto moves = moves_of("S600 M3\nG0 X10 Z5\nG33 Z-15 K1.5\nX13 Z-19 K2\nG0 Z5\nM5");
+  ASSERT_EQ(moves.size(), 4u);
+  EXPECT_NEAR(moves[1].feed, 1.5e-3 * 10, 1e-15);
+  EXPECT_NEAR(moves[2].feed, 2e-3 * 10, 1e-15);
+  EXPECT_EQ(moves[1].panel, Move::Panel::locked);
+  EXPECT_NEAR(moves[1].feed_per_turn, 1.5e-3, 1e-18);
+  EXPECT_EQ(path_of("S600 M3\nG33 Z-15 K1.5"), "l 0 0 -15");
+}
+
+TEST(GcodeThreads, RigidTappingGoesBackWithTheSpindleReversed) {
+  const auto blocks = blocks_of("S500 M3\nG0 X5 Z3\nG33.1 Z-10 K1.25");
+  ASSERT_EQ(blocks.size(), 6u);
+  EXPECT_NEAR(std::get<Move>(blocks[2]).end[kZ], -10e-3, 1e-15);
+  EXPECT_EQ(std::get<SpindleWord>(blocks[3]).mode, SpindleWord::Mode::counter_clockwise);
+  EXPECT_NEAR(std::get<Move>(blocks[4]).end[kZ], 3e-3, 1e-15);
+  EXPECT_EQ(std::get<SpindleWord>(blocks[5]).mode, SpindleWord::Mode::clockwise);
+}
+
+TEST(GcodeThreads, AreRefusedWithTheReason) {
+  EXPECT_NE(refused("S100 M3\nG33 Z1").find("G33 without K"), std::string::npos);
+  EXPECT_NE(refused("S100\nG33 Z1 K1").find("spindle at rest"), std::string::npos);
+  EXPECT_NE(refused("S100 M3\nG33 Z1 K0").find("more than 0"), std::string::npos);
+  EXPECT_NE(refused("S100 M3\nG33 Z0 K1").find("ends where it starts"), std::string::npos);
+}
+
+// Into the bore beside the wall, up at feed, and out the same way.
+TEST(GcodeCycles, BackBoringCutsUpwards) {
+  EXPECT_EQ(path_of("S500 M3 F100\nG0 X10 Z20\nG98 G87 X30 R-10 Z-5 Q2\nG80"),
+            "r 10 0 20; r 30 0 20; r 32 0 20; r 32 0 -10; r 30 0 -10; l 30 0 -5; r 32 0 -5; "
+            "r 32 0 20; r 30 0 20");
+  EXPECT_NE(refused("S500 M3 F100\nG0 Z20\nG87 X30 R-5 Z-10 Q2").find("bores upwards"),
+            std::string::npos);
+  EXPECT_NE(refused("S500 M3 F100\nG0 Z20\nG99 G87 X30 R-10 Z-5 Q2").find("allowed is G98"),
+            std::string::npos);
+}
+
+TEST(GcodeOverrides, SayWhatTheOperatorMayDo) {
+  using Panel = Move::Panel;
+  const auto moves = moves_of(
+      "F100\nG1 X1\nM49\nX2\nM48\nX3\nM50 P0\nX4\nM50\nX5\nG31 X6\nS500 M3\nG98 G84 X7 Z-1 "
+      "R1\nG80");
+  std::vector<Panel> panels;
+  for (const Move& move : moves)
+    if (move.kind == Move::Kind::line) panels.push_back(move.panel);
+  EXPECT_EQ(panels, (std::vector<Panel>{Panel::acts, Panel::fixed, Panel::acts, Panel::fixed,
+                                        Panel::acts, Panel::fixed, Panel::locked, Panel::locked}));
+}
+
+TEST(GcodeTools, HaveOffsetsOfTheRotaryAxes) {
+  InterpreterOptions options = bare();
+  options.tools->entry(3).offset << 0.001, 0, 0.03, 5 * kDegree, -10 * kDegree;
+  const auto moves = moves_of("G43 H3\nG0 X0 Z0 A1 C2\nG43.1 A20\nC0 A0", options);
+  ASSERT_EQ(moves.size(), 2u);
+  EXPECT_NEAR(moves[0].end[kA], 6 * kDegree, 1e-15);
+  EXPECT_NEAR(moves[0].end[kC], -8 * kDegree, 1e-15);
+  EXPECT_NEAR(moves[1].end[kA], 20 * kDegree, 1e-15);
+  // The table is read again as it was written.
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("tools_" + std::to_string(getpid()) + ".tbl"))
+          .string();
+  std::ofstream(path) << options.tools->to_text(1e-3);
+  const ToolTable again = ToolTable::read(path, 1e-3);
+  std::filesystem::remove(path);
+  ASSERT_EQ(again.all().size(), options.tools->all().size());
+  for (const auto& [number, tool] : options.tools->all()) {
+    EXPECT_LE((again.find(number)->offset - tool.offset).norm(), 1e-12) << number;
+    EXPECT_NEAR(again.find(number)->diameter, tool.diameter, 1e-12);
+  }
+}
+
+TEST(GcodeExpressions, AnUnknownOperatorIsNamed) {
+  EXPECT_NE(refused("G0 X[1 % 2]").find("'%' is no operator; allowed are ** * /"),
+            std::string::npos);
+  EXPECT_NE(refused("G0 X[1 + 2").find("'[' without its ']'"), std::string::npos);
 }
 
 }  // namespace

@@ -100,6 +100,21 @@ TEST(Gcode, PathModes) {
   EXPECT_NEAR(only_move("G20 G64 P0.001 G0 X0").tolerance, 25.4e-6, 1e-18);
 }
 
+TEST(Gcode, DynamicsOfFanucAndSiemens) {
+  using Dynamics = NcParams::Dynamics;
+  const std::string text =
+      "G0 X0\nG5.1 Q1 R1\nX1\nG5.1 Q1 R5\nX2\nG5.1 Q1 R6\nX3\nG5.1 Q1 R10\nX4\nG5.1 Q1\nX5\n"
+      "DYNROUGH\nX6\nDYNFINISH\nX7\nDYNNORM\nX8\nDYNPOS X9\nDYNSEMIFIN\nX10\nG5.1 Q0\nX11\nM30\n";
+  for (const Dynamics usual : {Dynamics::smooth, Dynamics::fast}) {
+    Machine machine = test_machine();
+    machine.nc.dynamics = usual;
+    std::vector<Dynamics> found;
+    for (const Move& move : read_moves(text, machine)) found.push_back(move.dynamics);
+    const Dynamics s = Dynamics::smooth, f = Dynamics::fast;
+    EXPECT_EQ(found, (std::vector<Dynamics>{usual, f, f, s, s, usual, f, s, usual, f, s, usual}));
+  }
+}
+
 TEST(Gcode, MachineCoordinatesForOneBlock) {
   const auto moves = read_moves("G43 H1\nG53 G0 Z5\nZ5\nM30\n", test_machine());
   ASSERT_EQ(moves.size(), 2u);
@@ -271,9 +286,11 @@ const WrongProgram kWrong[] = {
     // codes
     {"G12.3\nM30", 1, "unknown G12.3; allowed are G0 G1"},
     {"G5.1\nM30", 1, "G5.1 without Q"},
+    {"G5.1 Q1 R11\nM30", 1, "1:9: R of G5.1 must be a level from 1 (fast) to 10 (smooth)"},
+    {"G5.1 Q1 R2.5\nM30", 1, "R of G5.1 must be a level"},
     {"G31 X1\nM30", 1, "G31 without F"},
-    {"G33 Z1 K1\nM30", 1, "unknown G33"},
-    {"G87 X1 R2 Z1 F9\nM30", 1, "G87 (back boring) is not supported"},
+    {"G33 Z1 K1\nM30", 1, "G33 with the spindle at rest"},
+    {"G87 X1 R2 Z1 F9\nM30", 1, "G87 with the spindle at rest"},
     {"G-1\nM30", 1, "unknown G-1"},
     {"G0.05 X1\nM30", 1, "unknown G0.05"},
     {"M12\nM30", 1, "unknown M12; allowed are M0"},

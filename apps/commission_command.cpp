@@ -1,0 +1,48 @@
+#include "apps/commission_command.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <iostream>
+
+#include "analysis/whole_file.hpp"
+#include "apps/node_options.hpp"
+#include "apps/progress_line.hpp"
+#include "apps/stop_signal.hpp"
+#include "configs/config.hpp"
+#include "diagnosis/any_record.hpp"
+#include "diagnosis/diagnose.hpp"
+#include "diagnosis/diagnosis_text.hpp"
+#include "diagnosis/machine_replica.hpp"
+
+namespace vcnc {
+
+int commission_command(const CommissionOptions& options) {
+  catch_stop_signals();
+  const Record record = load_record(options.run, options.map);
+  const Machine declared = declared_machine(options.model, record);
+  std::error_code error;
+  if (!options.model.empty() && std::filesystem::equivalent(options.model, options.out, error))
+    throw InputError("--out " + options.out + ": is the declared machine itself");
+  MachineReplica replica(record, declared, piece_of(declared, record));
+  if (replica.channels().empty())
+    throw InputError(record.source + ": holds nothing that can be predicted");
+  ProgressLine progress;
+  const auto keep_going = [&](const DiagnosisProgress& p) {
+    progress.show(fmt::format("{} {:.0f} %", p.doing, p.share * 100));
+    return !stop_requested();
+  };
+  const Commissioning c =
+      commission({record, replica, declared, candidates(declared)}, {}, keep_going);
+  progress.clear();
+  for (const std::string& note : c.notes) std::cout << note << '\n';
+  for (const FittedNumber& n : c.numbers)
+    std::cout << fmt::format("  {} = {}\n", n.key, with_interval(n));
+  std::cout << figures_table(c.figures);
+  for (const std::string& warning : c.warnings) std::cerr << "vcnc: " << warning << '\n';
+  write_whole_file(options.out, to_toml(c.machine));
+  std::cout << "model: " << options.out << '\n';
+  return stop_requested() ? kExitInterrupted : kExitOk;
+}
+
+}  // namespace vcnc

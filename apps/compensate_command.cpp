@@ -1,0 +1,57 @@
+#include "apps/compensate_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+
+#include "analysis/whole_file.hpp"
+#include "apps/compensation_effect.hpp"
+#include "apps/compensation_for.hpp"
+#include "apps/node_options.hpp"
+#include "configs/config.hpp"
+
+namespace vcnc {
+namespace {
+
+void print(const std::vector<CompensationRemark>& remarks) {
+  if (remarks.empty()) std::cout << "The machine has no effects; nothing is compensated.\n";
+  for (const bool compensated : {true, false}) {
+    const auto belongs = [&](const CompensationRemark& r) { return r.compensated == compensated; };
+    if (std::none_of(remarks.begin(), remarks.end(), belongs)) continue;
+    std::cout << (compensated ? "Compensated:\n" : "Not compensated:\n");
+    for (const CompensationRemark& remark : remarks)
+      if (belongs(remark)) std::cout << fmt::format("  {:<26} {}\n", remark.effect, remark.text);
+  }
+}
+
+void print(const std::vector<PassComparison>& passes) {
+  std::cout << fmt::format("\n{:<22}{:>22}{:>24}\n{:<22}{:>10}{:>12}{:>12}{:>12}\n",
+                           "dynamic error [um]", "rms", "largest", "", "before", "after", "before",
+                           "after");
+  for (const PassComparison& p : passes)
+    std::cout << fmt::format("{:<22}{:>10.2f}{:>12.2f}{:>12.2f}{:>12.2f}\n",
+                             p.motion + ", " + p.pass, p.before.rms * 1e6, p.after.rms * 1e6,
+                             p.before.largest * 1e6, p.after.largest * 1e6);
+}
+
+}  // namespace
+
+int compensate_command(const CompensateOptions& options) {
+  if (options.out.empty() && !options.measure)
+    throw InputError("vcnc compensate: needs --out FILE, --measure or both");
+  const Machine machine = load_machine(options.machine, options.assignments, options.injections);
+  const CompensationProposal proposal = compensation_for(machine);
+  print(proposal.remarks);
+  if (!options.out.empty()) {
+    Machine compensated = machine;
+    compensated.nc.compensation = proposal.settings;
+    write_whole_file(options.out, to_toml(compensated));
+    std::cout << "machine: " << options.out << '\n';
+  }
+  if (options.measure) print(compare_compensation(machine, proposal.settings));
+  return kExitOk;
+}
+
+}  // namespace vcnc

@@ -1,0 +1,127 @@
+#include "apps/diagnose_command.hpp"
+
+#include <fmt/format.h>
+
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include "analysis/whole_file.hpp"
+#include "apps/node_options.hpp"
+#include "apps/page_folder.hpp"
+#include "apps/progress_line.hpp"
+#include "apps/stop_signal.hpp"
+#include "configs/config.hpp"
+#include "diagnosis/any_record.hpp"
+#include "diagnosis/diagnose.hpp"
+#include "diagnosis/diagnosis_json.hpp"
+#include "diagnosis/diagnosis_page.hpp"
+#include "diagnosis/diagnosis_text.hpp"
+#include "diagnosis/machine_replica.hpp"
+#include "diagnosis/quadrature.hpp"
+
+namespace vcnc {
+
+namespace {
+
+std::unique_ptr<MachineReplica> replica_of(const Record& record, const Machine& declared) {
+  std::unique_ptr<MachineReplica> replica;
+  try {
+    replica = std::make_unique<MachineReplica>(record, declared, piece_of(declared, record));
+  } catch (const std::invalid_argument& e) {
+    throw InputError(record.source + ": " + e.what());
+  }
+  if (replica->channels().empty())
+    throw InputError(record.source +
+                     ": holds nothing that can be predicted: a position, twist or force needs the "
+                     "command or a position of its axis, a deflection those of all axes");
+  return replica;
+}
+
+void append_figures(std::vector<SignalFigure>& figures, const Record& record,
+                    const Machine& declared, const Machine& found, const std::string& name) {
+  const auto replica = replica_of(record, declared);
+  const std::vector<SignalFigure> more = figures_of(record, *replica, declared, found, name);
+  figures.insert(figures.end(), more.begin(), more.end());
+}
+
+void predict_tests(const DiagnoseOptions& options, const Machine& declared, const Machine& found,
+                   std::vector<SignalFigure>& figures) {
+  for (const std::string& test : options.tests) {
+    if (stop_requested()) return;
+    append_figures(figures, load_record(test, options.map), declared, found, test);
+  }
+}
+
+int compare_models(const DiagnoseOptions& options, const Record& record, const Machine& declared) {
+  const Machine found = load_machine(options.compare);
+  std::vector<SignalFigure> figures;
+  append_figures(figures, record, declared, found, "run");
+  predict_tests(options, declared, found, figures);
+  std::cout << figures_table(figures);
+  return stop_requested() ? kExitInterrupted : kExitOk;
+}
+
+std::vector<Candidate> candidates_without(const Machine& declared,
+                                          const std::vector<std::string>& effects) {
+  std::vector<Candidate> all = candidates(declared);
+  for (const std::string& effect : effects)
+    if (std::erase_if(all, [&](const Candidate& c) { return c.effect == effect; }) == 0)
+      throw InputError("--without: \"" + effect +
+                       "\" is no effect that a diagnosis would try; vcnc effects lists them");
+  return all;
+}
+
+Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
+                           MachineReplica& replica, const Machine& declared) {
+  std::optional<Record> reference;
+  std::unique_ptr<MachineReplica> replica_of_reference;
+  std::optional<HealthyRun> healthy;
+  if (!options.reference.empty()) {
+    reference = load_record(options.reference, options.map);
+    replica_of_reference = replica_of(*reference, declared);
+    healthy.emplace(HealthyRun{*reference, *replica_of_reference});
+  }
+  ProgressLine progress;
+  const auto keep_going = [&](const DiagnosisProgress& p) {
+    progress.show(fmt::format("{} {:.0f} %", p.doing, p.share * 100));
+    return !stop_requested();
+  };
+  Diagnosis d = diagnose({record, replica, declared, candidates_without(declared, options.without)},
+                         healthy, {}, keep_going);
+  progress.show("predicting test runs");
+  predict_tests(options, d.declared, d.found, d.figures);
+  if (stop_requested()) d.warnings.push_back("stopped before the end; what was found so far");
+  return d;
+}
+
+}  // namespace
+
+int diagnose_command(const DiagnoseOptions& options) {
+  catch_stop_signals();
+  const Record record = load_record(options.run, options.map);
+  const Machine declared = declared_machine(options.model, record);
+  if (!options.compare.empty()) return compare_models(options, record, declared);
+  const bool bare = is_bare_encoder(record);
+  if (bare && !(options.reference.empty() && options.tests.empty()))
+    throw InputError("--reference, --test: are for machines, not for the signals of an encoder");
+  const std::string page = "report.html";
+  std::filesystem::path folder;
+  if (!options.out.empty()) folder = page_folder(options.out, page, kDiagnosisMark);
+  const auto replica = bare ? nullptr : replica_of(record, declared);
+  const Diagnosis d = bare ? diagnose_quadrature(record, declared)
+                           : diagnose_machine(options, record, *replica, declared);
+  std::cout << to_text(d);
+  const int code = stop_requested() ? kExitInterrupted : kExitOk;
+  if (folder.empty()) return code;
+  DiagnosisStory story{.diagnosis = d, .record = record, .residuals = {}};
+  if (replica) story.residuals = model_residuals(record, *replica, d.declared, d.found);
+  write_whole_file(folder / "diagnosis.json", to_json(d, record.source));
+  write_whole_file(folder / "found.toml", to_toml(d.found));
+  write_whole_file(folder / page, diagnosis_page(story));
+  std::cout << "model:  " << (folder / "found.toml").string() << '\n'
+            << "report: " << (folder / page).string() << '\n';
+  return code;
+}
+
+}  // namespace vcnc

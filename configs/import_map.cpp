@@ -1,0 +1,353 @@
+#include "configs/import_map.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <tuple>
+
+#include "configs/config.hpp"
+#include "configs/spelling.hpp"
+#include "model/axes.hpp"
+
+namespace vcnc {
+
+namespace {
+
+using Kind = ImportMap::Kind;
+
+constexpr std::array kUnits{
+    MeasuredUnit{"m", Dimension::length, 1},
+    MeasuredUnit{"mm", Dimension::length, 1e-3},
+    MeasuredUnit{"um", Dimension::length, 1e-6},
+    MeasuredUnit{"nm", Dimension::length, 1e-9},
+    MeasuredUnit{"in", Dimension::length, 25.4e-3},
+    MeasuredUnit{"rad", Dimension::angle, 1},
+    MeasuredUnit{"mrad", Dimension::angle, 1e-3},
+    MeasuredUnit{"urad", Dimension::angle, 1e-6},
+    MeasuredUnit{"deg", Dimension::angle, kDegree},
+    MeasuredUnit{"arcsec", Dimension::angle, kDegree / 3600},
+    MeasuredUnit{"rev", Dimension::angle, 2 * kPi},
+    MeasuredUnit{"m/s", Dimension::speed, 1},
+    MeasuredUnit{"mm/s", Dimension::speed, 1e-3},
+    MeasuredUnit{"mm/min", Dimension::speed, 1e-3 / 60},
+    MeasuredUnit{"m/min", Dimension::speed, 1.0 / 60},
+    MeasuredUnit{"rad/s", Dimension::angular_speed, 1},
+    MeasuredUnit{"deg/s", Dimension::angular_speed, kDegree},
+    MeasuredUnit{"rpm", Dimension::angular_speed, 2 * kPi / 60},
+    MeasuredUnit{"N", Dimension::force, 1},
+    MeasuredUnit{"kN", Dimension::force, 1e3},
+    MeasuredUnit{"Nm", Dimension::torque, 1},
+    MeasuredUnit{"mNm", Dimension::torque, 1e-3},
+    MeasuredUnit{"V", Dimension::voltage, 1},
+    MeasuredUnit{"mV", Dimension::voltage, 1e-3},
+    MeasuredUnit{"1", Dimension::share, 1},
+    MeasuredUnit{"K", Dimension::temperature, 1},
+    MeasuredUnit{"degC", Dimension::temperature, 1, 273.15},
+    MeasuredUnit{"s", Dimension::time, 1},
+    MeasuredUnit{"ms", Dimension::time, 1e-3},
+    MeasuredUnit{"us", Dimension::time, 1e-6},
+    MeasuredUnit{"ns", Dimension::time, 1e-9},
+    MeasuredUnit{"min", Dimension::time, 60},
+};
+
+constexpr std::array<std::string_view, 3> kProbeNames{"x", "y", "z"};
+
+/// What a signal may be measured in.
+std::vector<Dimension> dimensions(Kind kind, bool rotary) {
+  switch (kind) {
+    case Kind::velocity:
+      return {rotary ? Dimension::angular_speed : Dimension::speed};
+    case Kind::force:
+      return {rotary ? Dimension::torque : Dimension::force};
+    case Kind::deflection:
+      return {Dimension::length};
+    case Kind::cosine:
+    case Kind::sine:
+      return {Dimension::voltage, Dimension::share};
+    case Kind::temperature:
+      return {Dimension::temperature};
+    case Kind::clock:
+      return {Dimension::time};
+    case Kind::command:
+    case Kind::position:
+    case Kind::motor_position:
+    case Kind::load_position:
+    case Kind::twist:
+      break;
+  }
+  return {rotary ? Dimension::angle : Dimension::length};
+}
+
+bool of_probe(Kind kind) {
+  return kind == Kind::deflection || kind == Kind::cosine || kind == Kind::sine;
+}
+bool of_nothing(Kind kind) { return kind == Kind::temperature || kind == Kind::clock; }
+
+int line_of(const KeyLines& lines, std::string_view key) {
+  if (const auto at = lines.find(key); at != lines.end()) return at->second;
+  const auto whole = lines.find("");
+  return whole == lines.end() ? 0 : whole->second;
+}
+
+/// Refuses with the place of a key.
+class Refusal {
+ public:
+  Refusal(const std::string& name, std::string path, const KeyLines& lines)
+      : name_(name), path_(std::move(path)), lines_(lines) {}
+
+  [[noreturn]] void operator()(std::string_view key, const std::string& reason) const {
+    const int line = line_of(lines_, key);
+    const std::string place = line > 0 ? fmt::format("{}:{}", name_, line) : name_;
+    throw ConfigError(fmt::format("{}: {}{}: {}", place, path_, key, reason));
+  }
+
+ private:
+  const std::string& name_;
+  std::string path_;
+  const KeyLines& lines_;
+};
+
+template <class List, class T>
+bool contains(const List& list, const T& wanted) {
+  return std::find(list.begin(), list.end(), wanted) != list.end();
+}
+
+std::string own_names(const ImportMap& map) {
+  std::string all;
+  for (const ImportMap::Axis& a : map.axes) all += ", \"" + a.name + "\"";
+  return all;
+}
+
+/// The place that a signal's axis names; empty where there is none of that name.
+std::string_view place_name(const ImportMap& map, std::string_view axis) {
+  for (const ImportMap::Axis& a : map.axes)
+    if (a.name == axis) return a.place;
+  return axis;
+}
+
+std::string unit_hint(const MeasuredUnit& unit, Kind kind, bool rotary) {
+  if (kind != Kind::force) return "";
+  if (unit.dimension == Dimension::torque && !rotary)
+    return "; of a motor's torque give unit \"N\" and as scale the newtons at the carriage per "
+           "newton metre";
+  return "";
+}
+
+void check_unit(const ImportMap& map, const ImportMap::Signal& s, const Refusal& refuse) {
+  const SignalPlace place = place_of(map, s);
+  const std::vector<Dimension> may = dimensions(s.kind, place.rotary);
+  std::string allowed;
+  for (const Dimension d : may) allowed += (allowed.empty() ? "" : ", ") + measured_units(d);
+  const std::string subject =
+      of_nothing(s.kind)
+          ? fmt::format("a {}", to_string(s.kind))
+          : fmt::format("the {} of {}", to_string(s.kind),
+                        of_probe(s.kind) ? "the probe"
+                                         : (place.rotary ? "a rotary axis" : "a linear axis"));
+  const std::string tail = fmt::format("allowed for {}: {}", subject, allowed);
+  if (s.unit.empty()) refuse("unit", "is missing; " + tail);
+  const MeasuredUnit* unit = find_measured_unit(s.unit);
+  if (!unit && (s.unit == "A" || s.unit == "%"))
+    refuse("unit", fmt::format("\"{}\" is no unit of a force; give unit \"{}\" and as scale the "
+                               "{} per {}",
+                               s.unit, place.rotary ? "Nm" : "N",
+                               place.rotary ? "newton metres" : "newtons",
+                               s.unit == "A" ? "ampere" : "per cent"));
+  if (!unit) refuse("unit", fmt::format("\"{}\" is unknown; {}", s.unit, tail));
+  if (!contains(may, unit->dimension))
+    refuse("unit", fmt::format("\"{}\" does not fit; {}{}", s.unit, tail,
+                               unit_hint(*unit, s.kind, place.rotary)));
+}
+
+/// The heading or number that a signal names.
+std::string column_text(const std::string& column, int number) {
+  return column.empty() ? fmt::format("number {}", number) : fmt::format("\"{}\"", column);
+}
+
+void check_axes(const ImportMap& map, const std::string& name) {
+  std::set<std::string> names, places;
+  for (std::size_t i = 0; i < map.axes.size(); ++i) {
+    const ImportMap::Axis& a = map.axes[i];
+    const Refusal refuse(name, "axes.", a.lines);
+    if (a.name.empty()) refuse("name", "is missing");
+    if (!contains(kAxisNames, a.place) && !contains(kProbeNames, a.place))
+      refuse("place", fmt::format("\"{}\" is no place; allowed X, Y, Z, A, C, or x, y, z of the "
+                                  "probe",
+                                  a.place));
+    if (contains(kAxisNames, a.name) && a.name != a.place)
+      refuse("name", fmt::format("\"{}\" is the name of another axis of the machine file", a.name));
+    if (!names.insert(a.name).second) refuse("name", fmt::format("\"{}\" is given twice", a.name));
+    if (!places.insert(a.place).second)
+      refuse("place", fmt::format("\"{}\" is taken by another axis already", a.place));
+  }
+}
+
+void check_time(const ImportMap& map, const std::string& name) {
+  const ImportMap::Time& t = map.time;
+  const Refusal refuse(name, "time.", t.lines);
+  const bool column = !t.column.empty() || t.number > 0;
+  if (!t.column.empty() && t.number > 0)
+    refuse("number", "column is given as well; one of them is too many");
+  if (column == (t.rate > 0))
+    refuse(column ? "rate_hz" : "column",
+           column ? "a column with the time is given as well; one of them is too many"
+                  : "is missing; time needs a column (or its number) with its unit, or rate_hz");
+  if (!column) return;
+  const MeasuredUnit* unit = find_measured_unit(t.unit);
+  const std::string allowed = "allowed: " + measured_units(Dimension::time);
+  if (t.unit.empty()) refuse("unit", "is missing; " + allowed);
+  if (!unit || unit->dimension != Dimension::time)
+    refuse("unit", fmt::format("\"{}\" is no unit of time; {}", t.unit, allowed));
+}
+
+void check_laps(const ImportMap& map, const std::string& name) {
+  if (!map.laps.empty() && !map.lap_column.empty())
+    Refusal(name, "", map.lines)("lap_column", "laps are given as well; one of them is too many");
+  if (!map.condition_column.empty() && map.lap_column.empty())
+    Refusal(name, "", map.lines)("condition_column", "needs lap_column");
+  double last = -HUGE_VAL;
+  for (const ImportMap::Lap& lap : map.laps) {
+    const Refusal refuse(name, "laps.", lap.lines);
+    if (!(lap.from < lap.to)) refuse("to_s", "must be after from_s");
+    if (lap.from < last) refuse("from_s", "the lap begins before the one above it ends");
+    last = lap.to;
+  }
+}
+
+void check_signal(const ImportMap& map, const ImportMap::Signal& s, const Refusal& refuse) {
+  if (!s.column.empty() && s.number > 0)
+    refuse("number", "column is given as well; one of them is too many");
+  if (s.column.empty() && s.number == 0) refuse("column", "is missing");
+  if (!s.lines.contains("kind"))
+    refuse("kind",
+           "is missing; allowed command, position, motor_position, load_position, twist, "
+           "velocity, force, deflection, cosine, sine, temperature, clock");
+  if (s.sign == 0) refuse("sign", "0 is not possible, allowed 1 or -1");
+  if (s.scale == 0) refuse("scale", "0 would make every value the same");
+  if (of_nothing(s.kind)) {
+    if (!s.axis.empty()) refuse("axis", fmt::format("a {} belongs to no axis", to_string(s.kind)));
+    return;
+  }
+  if (s.axis.empty())
+    refuse("axis", fmt::format("is missing; allowed {}{}",
+                               of_probe(s.kind) ? "x, y, z" : "X, Y, Z, A, C", own_names(map)));
+  const std::string_view place = place_name(map, s.axis);
+  const bool fits = of_probe(s.kind) ? contains(kProbeNames, place) : contains(kAxisNames, place);
+  if (!fits)
+    refuse(
+        "axis",
+        fmt::format("\"{}\" is no axis that has a {}; allowed {}{}", s.axis, to_string(s.kind),
+                    of_probe(s.kind) ? "x, y, z of the probe" : "X, Y, Z, A, C", own_names(map)));
+}
+
+void check_signals(const ImportMap& map, const std::string& name) {
+  if (map.signals.empty())
+    Refusal(name, "", map.lines)("signals", "is missing; a map needs at least one [[signals]]");
+  std::set<std::tuple<Kind, bool, std::size_t>> seen;
+  std::set<std::string> columns;
+  if (map.time.number > 0 || !map.time.column.empty())
+    columns.insert(column_text(map.time.column, map.time.number));
+  for (const ImportMap::Signal& s : map.signals) {
+    const Refusal refuse(name, "signals.", s.lines);
+    check_signal(map, s, refuse);
+    check_unit(map, s, refuse);
+    const SignalPlace place = place_of(map, s);
+    if (!columns.insert(column_text(s.column, s.number)).second)
+      refuse(s.column.empty() ? "number" : "column",
+             fmt::format("column {} is given twice", column_text(s.column, s.number)));
+    if (s.kind != Kind::temperature && !seen.insert({s.kind, place.probe, place.axis}).second)
+      refuse("kind", fmt::format("the {}{} is given twice", to_string(s.kind),
+                                 s.axis.empty() ? "" : " of " + s.axis));
+  }
+  for (const ImportMap::Signal& s : map.signals) {
+    const Refusal refuse(name, "signals.", s.lines);
+    const SignalPlace place = place_of(map, s);
+    const auto has = [&](Kind kind) { return seen.contains({kind, place.probe, place.axis}); };
+    const bool closed = has(Kind::position);
+    if (s.kind == Kind::twist && (has(Kind::motor_position) || has(Kind::load_position)))
+      refuse("kind", fmt::format("the twist of {} follows from its two positions, which are given "
+                                 "as well",
+                                 s.axis));
+    if (s.kind == Kind::load_position && closed && has(Kind::motor_position))
+      refuse("kind",
+             fmt::format("{} has three positions; position is that of the motor or of the load",
+                         s.axis));
+    if (s.kind == Kind::sine && !has(Kind::cosine))
+      refuse("kind", fmt::format("{} has a sine, but no cosine", s.axis));
+    if (s.kind == Kind::cosine && !has(Kind::sine))
+      refuse("kind", fmt::format("{} has a cosine, but no sine", s.axis));
+  }
+}
+
+}  // namespace
+
+const MeasuredUnit* find_measured_unit(std::string_view name) {
+  const auto at = std::find_if(kUnits.begin(), kUnits.end(),
+                               [&](const MeasuredUnit& u) { return u.name == name; });
+  return at == kUnits.end() ? nullptr : &*at;
+}
+
+std::string measured_units(Dimension dimension) {
+  std::string all;
+  for (const MeasuredUnit& u : kUnits)
+    if (u.dimension == dimension) all += (all.empty() ? "" : ", ") + std::string(u.name);
+  return all;
+}
+
+std::string_view to_string(ImportMap::Kind kind) {
+  switch (kind) {
+    case Kind::command:
+      return "command";
+    case Kind::position:
+      return "position";
+    case Kind::motor_position:
+      return "motor_position";
+    case Kind::load_position:
+      return "load_position";
+    case Kind::twist:
+      return "twist";
+    case Kind::velocity:
+      return "velocity";
+    case Kind::force:
+      return "force";
+    case Kind::deflection:
+      return "deflection";
+    case Kind::cosine:
+      return "cosine";
+    case Kind::sine:
+      return "sine";
+    case Kind::temperature:
+      return "temperature";
+    case Kind::clock:
+      return "clock";
+  }
+  return "?";
+}
+
+SignalPlace place_of(const ImportMap& map, const ImportMap::Signal& signal) {
+  if (of_nothing(signal.kind)) return {};
+  const std::string_view place = place_name(map, signal.axis);
+  for (std::size_t i = 0; i < kAxisNames.size(); ++i)
+    if (kAxisNames[i] == place) return {.axis = i, .rotary = is_rotary(i)};
+  for (std::size_t i = 0; i < kProbeNames.size(); ++i)
+    if (kProbeNames[i] == place) return {.axis = i, .probe = true};
+  return {};
+}
+
+double to_si(const ImportMap::Signal& signal, double value) {
+  const MeasuredUnit* unit = find_measured_unit(signal.unit);
+  const double in_unit = signal.sign * signal.scale * value + signal.offset;
+  return unit ? (in_unit + unit->shift) * unit->factor : in_unit;
+}
+
+void check_import_map(const ImportMap& map, const std::string& name) {
+  check_axes(map, name);
+  check_time(map, name);
+  check_signals(map, name);
+  check_laps(map, name);
+}
+
+}  // namespace vcnc

@@ -1,0 +1,438 @@
+#!/usr/bin/env python3
+"""The blind test of `vcnc diagnose`: draws machines with unknown faults, has them diagnosed, grades the answers.
+
+    bench.py VCNC [--parts independent,own] [--seed N] [--kinds clean=8,single=40,...] [--work DIR]
+             [--jobs 2] [--markdown FILE] [--bounds NAME]
+
+Part `own`: recordings of the virtual machine itself (vcnc run --inject), against the declared model.
+Part `independent`: tables of the generator in generator/, which shares no code, friction law, integrator,
+loop rates, kinematics or noise with vcnc; differential, the piece clamped anew and the machine at another
+thermal state between the healthy run and the test.
+
+Answer keys are written and their SHA-256 printed before anything is diagnosed. Every run counts. With --bounds
+the measured shares must not fall behind those of bounds.toml; exit code 1 if one does.
+"""
+
+import argparse
+import concurrent.futures
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE / "generator")]
+
+import numpy as np
+
+import files
+import generate
+import grading
+import machine
+import program
+
+# Leave no trace that repeats (a noise audit's matter) or none behind the logged command (the NC unit's).
+NOT_REPEATABLE = {"encoder_quantisation", "bus_loss", "bus_jitter", "frame_vibration", "mains_hum", "adc_noise",
+                  "sample_jitter", "dropped_samples"}
+BEFORE_THE_COMMAND = {"corner_cutting", "chord_error", "path_filter"}
+SET_UP = {"piece_offset", "piece_tilt"}  # clamped anew for every run: never a finding
+DECLARED = {"coulomb", "stribeck", "viscous", "presliding", "windup", "surface_friction"}
+S_PIECE = HERE.parents[1] / "configs/pieces/s_eq1.toml"
+MODEL = "found.toml"  # what a diagnosis calls the machine it found
+WHOLE = {"periods", "channel", "delay_cycles", "lobes", "harmonic", "order"}
+
+
+def run(command):
+    """Processor time of a child, user and system; its output on failure."""
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    output = process.stdout.read()
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        raise RuntimeError(f"{' '.join(map(str, command))}: exit code {process.returncode}\n{output[-2000:]}")
+    return used.ru_utime + used.ru_stime
+
+
+def diagnose(vcnc, answer, arguments, out):
+    """The grade of one diagnosis; with --work it is kept beside what was found and taken from there again."""
+    kept = out.with_suffix(".json")
+    if kept.exists():
+        return json.loads(kept.read_text())
+    row = diagnose_anew(vcnc, answer, arguments, out)
+    kept.write_text(json.dumps(row))
+    return row
+
+
+def diagnose_anew(vcnc, answer, arguments, out):
+    try:
+        seconds = run([vcnc, "diagnose", *arguments, "--out", str(out)])
+    except RuntimeError as error:
+        return {"kind": answer["kind"], "truth": [grading.label(e) for e in answer["effects"]] or [answer.get("unknown", "")],
+                "number": answer.get("number"), "failed": str(error)}
+    report = json.loads((out / "diagnosis.json").read_text())
+    if report.get("law"):
+        laws = tomllib.loads((out / MODEL).read_text()).get("effects", {}).get("law", [])
+        report["law"].update(next((l for l in laws if l.get("label", "").startswith("learned")), {}))
+    return grading.grade(answer, report, seconds)
+
+
+# --- the virtual machine as the generator -------------------------------------------------------------
+
+def library(vcnc):
+    text = subprocess.run([vcnc, "effects", "--json"], check=True, capture_output=True, text=True).stdout
+    return {e["name"]: e for e in json.loads(text)["effects"]}
+
+
+def declared_number(key):
+    values = tomllib.loads(files.machine_toml())
+    for part in key.split("."):
+        values = values[part] if isinstance(values, dict) and part in values else None
+    return values
+
+
+def draw_own(rng, entry):
+    """An effect of the library at one of its places, sizes within a factor of three about the typical one."""
+    place = entry["places"][rng.integers(len(entry["places"]))]
+    factor, sign = 3 ** rng.uniform(-1, 1), rng.choice([-1.0, 1.0])
+    parameters, assignments = {}, []
+    for p in place["parameters"]:
+        short, nominal, default = p["key"].rsplit(".", 1)[1], p["nominal"], p["default"]
+        held = declared_number(p["key"])
+        if held is not None:
+            value = held * (1 + sign * min(0.4 * factor / 3, 0.6)) if not parameters else held
+        elif short.startswith("phase"):
+            value = float(rng.uniform(-180, 180))
+        elif short == "start_s":
+            value = float(rng.uniform(10, 50))
+        elif short in WHOLE or not np.any(nominal):
+            value = nominal
+        elif np.any(default):
+            value = nominal
+        else:
+            signed = p["min"] < 0
+            value = [v * factor * (rng.choice([-1.0, 1.0]) if signed else 1) for v in nominal] if isinstance(
+                nominal, list) else nominal * factor * (sign if signed else 1)
+            value = np.clip(value, p["min"], p["max"]).tolist()
+        parameters[short] = value
+        assignments.append((p["key"], value))
+    return {"name": entry["name"], "place": place["place"], "parameters": parameters}, assignments
+
+
+def set_up(rng):
+    """Tolerances of an individual and how the piece is clamped, as assignments."""
+    out = [("effects.setup.piece_offset.shift_um", (5 * rng.standard_normal(3)).tolist()),
+           ("effects.setup.piece_tilt.tilt_urad", (20 * rng.standard_normal(3)).tolist())]
+    for i, axis in enumerate(machine.AXES):
+        unit = "kgm2" if files.ROTARY[i] else "kg"
+        out.append((f"axes.{axis}.load_{unit}", machine.DECLARED["load"][i] * (1 + 0.01 * rng.standard_normal())))
+        level = "level_Nm" if files.ROTARY[i] else "level_N"
+        out.append((f"effects.{axis}.coulomb.{level}", machine.DECLARED["coulomb"][i] * (1 + 0.03 * rng.standard_normal())))
+        b = "coefficient_Nms_per_rad" if files.ROTARY[i] else "coefficient_Ns_per_m"
+        out.append((f"effects.{axis}.viscous.{b}", machine.DECLARED["viscous"][i] * (1 + 0.05 * rng.standard_normal())))
+    return out
+
+
+def own_scenarios(rng, counts, entries):
+    names = sorted(set(entries) - NOT_REPEATABLE - BEFORE_THE_COMMAND - SET_UP)
+    order, out = [], []
+    for kind, count in counts.items():
+        if kind == "unknown":
+            continue
+        for _ in range(count):
+            number = {"clean": 0, "single": 1, "pair": 2, "triple": 3, "without": 1}[kind]
+            chosen = []
+            while len(chosen) < number:
+                if not order:
+                    order = list(rng.permutation(names))
+                name = order.pop() if number == 1 else str(rng.choice(names))
+                if name not in chosen and not (kind == "without" and name in DECLARED):
+                    chosen.append(name)
+            s = {"kind": kind, "effects": [], "values": {}, "number": len(out)}
+            assignments = dict(set_up(rng))
+            for name in chosen:
+                effect, values = draw_own(rng, entries[name])
+                s["effects"].append(effect)
+                assignments.update(values)
+                s["values"].update(generate.by_component(values))
+            if kind == "without":
+                effect = s["effects"][0]
+                s["without"] = effect["name"]
+                s["law_points"] = list(grading.HOOKS.get(entries[effect["name"]]["port"], ()))
+                s["law_axes"] = [effect["place"]] if effect["place"] in machine.AXES else list(machine.AXES)
+            s["assignments"] = assignments
+            out.append(s)
+    return out
+
+
+def text_of(value):
+    return "[" + ", ".join(f"{v:.9g}" for v in value) + "]" if isinstance(value, list) else f"{value:.9g}"
+
+
+def own_run(vcnc, work, s):
+    """One machine: run, diagnosed, graded."""
+    folder = work / f"own_{s['number']}"
+    command = [vcnc, "run", str(work / "program.ngc"), "--machine", str(work / "own.toml"), "--in-process", "--no-report",
+               "--seed", str(s["number"] + 1), "--out", str(folder)]
+    for key, value in s["assignments"].items():
+        command += ["--inject", f"{key.removeprefix('effects.')}={text_of(value)}"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode not in (0, 3):
+        return {"kind": s["kind"], "truth": [grading.label(e) for e in s["effects"]], "number": s["number"], "failed": done.stderr[-600:]}
+    extra = ["--without", s["without"]] if "without" in s else []
+    row = diagnose(vcnc, s, [str(folder), "--model", str(work / "own.toml"), *extra], work / f"own_{s['number']}_found")
+    shutil.rmtree(folder)
+    if s["kind"] == "single" and "failed" not in row:
+        transfer(vcnc, work, s, row)
+    return row
+
+
+def own_part(vcnc, work, seed, counts, jobs):
+    write_inputs(work)
+    noise = "".join(f"[effects.{a}.encoder_quantisation]\nquantum_{'arcsec' if r else 'nm'} = {0.02 if r else 20}\n"
+                    for a, r in zip(machine.AXES, files.ROTARY))
+    (work / "own.toml").write_text(files.machine_toml() + noise + "[effects.probe.adc_noise]\nnoise_mV = 5\n")
+    subprocess.run([vcnc, "program", "s-piece", "--machine", str(work / "own.toml"), "--set", f"setup.piece={S_PIECE}",
+                    "--feed-mm-min", "2000", "--out", str(work / "s.ngc")], check=True, capture_output=True)
+    drawn = own_scenarios(np.random.default_rng(seed), counts, library(vcnc))
+    for s in drawn:
+        number = s["number"]
+        print(f"own answer_{number} {files.write_answer(work / f'own_answer_{number}.json', s)}", flush=True)
+    return pooled(jobs, lambda s: own_run(vcnc, work, s), drawn)
+
+
+def contour_readings(vcnc, work, name, machine_file, assignments):
+    """Size of the probe's deflection [m] in every tick of the S piece's lap; NaN off the piece."""
+    folder = work / name
+    command = [vcnc, "run", str(work / "s.ngc"), "--machine", str(machine_file), "--set", f"setup.piece={S_PIECE}",
+               "--in-process", "--no-report", "--csv", "--out", str(folder)]
+    for key, value in assignments.items():
+        command += ["--inject", f"{key.removeprefix('effects.')}={text_of(value)}"]
+    subprocess.run(command, check=True, capture_output=True, text=True)
+    path = folder / "rows.csv"
+    with open(path, encoding="ascii") as file:
+        head = [h.split(" ")[0] for h in file.readline().strip().split(",")]
+    rows = np.loadtxt(path, delimiter=",", skiprows=1, usecols=[head.index(f"deflection.{c}") for c in "xyz"])
+    shutil.rmtree(folder)
+    size = np.linalg.norm(rows, axis=1)
+    return np.where(size > 0.3e-3, size, np.nan)
+
+
+def transfer(vcnc, work, s, row):
+    """What the model found on circles and lines leaves of the S piece's error, as a share of what the declared model
+    leaves: both against the true machine, another piece being clamped."""
+    if row.get("strength", 0) < 3 or not row["top"] or s["effects"][0]["name"] in ("period_slip", "contact_loss"):
+        return
+    truth = {k: v for k, v in s["assignments"].items() if not k.startswith("effects.setup.")}
+    name = f"transfer_{s['number']}"
+    true = contour_readings(vcnc, work, name, work / "own.toml", truth)
+    left = []
+    for model in (work / "own.toml", work / f"own_{s['number']}_found" / MODEL):
+        other = contour_readings(vcnc, work, name, model, {})
+        n = min(len(true), len(other))
+        left.append(float(np.sqrt(np.nanmean((true[:n] - other[:n]) ** 2))))
+    row["transfer"] = left[1] / left[0]
+
+
+# --- the independent generator ------------------------------------------------------------------------
+
+def write_inputs(work):
+    work.mkdir(parents=True, exist_ok=True)
+    (work / "machine.toml").write_text(files.machine_toml())
+    (work / "piece.toml").write_text(files.piece_toml())
+    (work / "program.ngc").write_text(program.program()[0])
+
+
+def independent_run(vcnc, work, s, absolute):
+    arguments = [str(work / f"test_{s['number']}.csv"), "--map", str(work / "map.toml"), "--model", str(work / "machine.toml")]
+    if not absolute:
+        arguments += ["--reference", str(work / s["reference"])]
+    return diagnose(vcnc, s, arguments, work / f"{'absolute' if absolute else 'found'}_{s['number']}")
+
+
+def independent_part(vcnc, work, seed, counts, jobs, individuals, absolute=False, numbers=None):
+    if (work / "answer_0.json").exists():  # drawn before, with its hashes
+        drawn = [json.loads(p.read_text()) for p in sorted(work.glob("answer_*.json"))]
+    else:
+        counts = {k: n for k, n in counts.items() if k != "without"}
+        drawn = generate.generate(vcnc, work, seed, counts, individuals)
+    drawn = [s for s in drawn if numbers is None or s["number"] in numbers]
+    return pooled(jobs, lambda s: independent_run(vcnc, work, s, absolute), sorted(drawn, key=lambda s: s["number"]))
+
+
+def shuffled(work, s, rng):
+    """The control: what the test differs from its reference, lap by lap, goes to laps of other conditions; lengths are
+    made equal by repetition. Whatever is found then is an error of the diagnosis."""
+    laps = tomllib.loads((work / "map.toml").read_text())["laps"]
+    with open(work / s["reference"], encoding="ascii") as file:
+        head = file.readline()
+    reference = np.loadtxt(work / s["reference"], delimiter=",", skiprows=1)
+    test = np.loadtxt(work / f"test_{s['number']}.csv", delimiter=",", skiprows=1)
+    rest, out = test - reference, reference.copy()
+    spans = [(round(l["from_s"] * 1000), round(l["to_s"] * 1000)) for l in laps]
+    while True:
+        order = rng.permutation(len(laps))
+        if all(laps[i]["condition"] != laps[j]["condition"] for i, j in enumerate(order)):
+            break
+    for (begin, end), j in zip(spans, order):
+        out[begin:end] += np.resize(rest[spans[j][0]:spans[j][1]], (end - begin, rest.shape[1]))
+    out[:, 0] = test[:, 0]
+    for i, name in enumerate(head.strip().split(",")):
+        if "_command_" in name:
+            out[:, i] = test[:, i]
+    name = work / f"shuffled_{s['number']}.csv"
+    with open(name, "w", encoding="ascii") as file:
+        file.write(head)
+        np.savetxt(file, out, fmt="%.9f", delimiter=",")
+    return name
+
+
+def shuffled_part(vcnc, work, seed, jobs, count=6):
+    """Of the independent part's first tests that have an effect."""
+    drawn = sorted((json.loads(p.read_text()) for p in work.glob("answer_*.json")), key=lambda s: s["number"])
+    drawn = [s for s in drawn if s["kind"] == "single"][:count]
+    rng = np.random.default_rng(seed)
+
+    def one(s):
+        arguments = [str(shuffled(work, s, rng)), "--map", str(work / "map.toml"), "--model", str(work / "machine.toml"),
+                     "--reference", str(work / s["reference"])]
+        return diagnose(vcnc, {"kind": "clean", "effects": [], "number": s["number"]}, arguments, work / f"shuffled_{s['number']}")
+    return pooled(jobs, one, drawn)
+
+
+def pooled(jobs, work, items):
+    """The children do the work; a line for each as it ends."""
+    rows = []
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+        for row in pool.map(work, items):
+            rows.append(row)
+            if "failed" in row:
+                print(f"  {row['number']:>3} {row['kind']:<8} {', '.join(row['truth'])}: FAILED {row['failed'][-300:]}", flush=True)
+                continue
+            mark = ("+" if row.get("exact") or (row["kind"] == "clean" and not row["claims"]) or row.get("law_right") else
+                    "~" if row.get("top") or row.get("rejected") else "-")
+            print(f"  {mark} {row['number']:>3} {row['kind']:<8} {', '.join(row['truth']) or '-':<40} {row['verdict']:<14}"
+                  f" {', '.join(row['told']) or '-'}  {row['law']}  {row['seconds']:.1f} s", flush=True)
+    return rows
+
+
+# --- report -------------------------------------------------------------------------------------------
+
+HEAD = """# Blind test of the diagnosis
+
+Written by `tests/diagnosis/bench.py build/release/bin/vcnc --seed SEED --kinds ... --markdown docs/diagnosis_bench.md`. Answer keys
+are written, and their SHA-256 printed, before anything is diagnosed; every run counts, none is left out.
+
+* **independent**: machines of `tests/diagnosis/generator/`, which shares nothing with vcnc but the commands: Maxwell-slip friction
+  (vcnc: LuGre bristles), velocity loop at 8 kHz on filtered differences, position loop at 2 kHz, two-stage current lag, semi-implicit
+  Euler at 16 kHz, screw exponentials, quasi-static contact, own noise (20 nm, 10 N, 0.15 um). Differential: a healthy run and a
+  test of one individual, whose masses and friction are off by their tolerances (mass 1 %, friction 3 to 10 %); between the two the
+  piece is clamped anew (5 um, 20 urad) and the thermal state changes (friction 1 to 3 %, scales 1 ppm, drift 0.1 um/min).
+* **independent_absolute**: the same tests against the declared model alone.
+* **own**: the virtual machine itself as the generator (`vcnc run --inject`), against the declared model: an easy setting, since
+  friction law and controller are the diagnosis' own. *left out*: the effect is injected and taken out of the library
+  (`vcnc diagnose --without`).
+* **shuffled**: what the first single tests differ from their reference, lap by lap, moved to laps of other conditions. Nothing may be found.
+
+The program is 62 s: circles of 30 mm at F3000 and F6000 in both senses in a ring gauge, turns of C and A about the ball, strokes of Z;
+everything twice. L is the detection limit that the diagnosis states itself; sizes are drawn log-uniformly within a factor of three
+about a typical one, so that some lie below L, where silence is right. Noise effects, the set-up and what happens before
+the logged command are not injected as findings.
+
+## The generator itself
+
+Checked against closed forms (`tests/diagnosis/generator/generator_test.py`: following error of a ramp, radius of a circle, friction
+level, virgin curve of the Maxwell elements, resonance of two masses, opening of a gap, delay; a published vector of the
+kinematics, axis errors against their vector formulas; Heydemann's errors of the signals). Against `vcnc run` of the same declared
+machine on the same commands, first 22 s of the program:
+
+| signal | rms in vcnc | rms in the generator | rms of the difference |
+|---|---|---|---|
+| following error X | 24.1 um | 24.1 um | 0.74 um |
+| following error Y | 35.1 um | 35.2 um | 0.95 um |
+| following error Z | 0.86 um | 0.75 um | 0.13 um |
+| load less motor X | 2.05 um | 2.07 um | 0.13 um |
+| force X | 687 N | 686 N | 23 N, of which 10 N are noise |
+| force Y | 888 N | 885 N | 21 N, of which 10 N are noise |
+
+So signs, units and instants agree, and what another friction law and controller make is some percent of the following error.
+"""
+
+
+def markdown(parts, seeds):
+    lines = [HEAD]
+    for part, rows in parts.items():
+        good = [r for r in rows if "failed" not in r]
+        lines += [f"## {part}", "", f"Seed {seeds}, {len(rows)} runs, {len(rows) - len(good)} of them ended in an error.", "",
+                  "| measure | result |", "|---|---|"]
+        lines += [f"| {k} | {v} |" for k, v in grading.summary(good).items()] if good else []
+        lines += ["", "Every run:", "", "| | kind | truth | size / L | verdict | told |", "|---|---|---|---|---|---|"]
+        for r in rows:
+            if "failed" in r:
+                lines.append(f"| {r['number']} | {r['kind']} | {', '.join(r['truth'])} | | error | |")
+                continue
+            strength = f"{r['strength']:.1f}" if "strength" in r else ""
+            lines.append(f"| {r['number']} | {r['kind']} | {', '.join(r['truth'])} | {strength} | {r['verdict']} | "
+                         f"{', '.join(r['told'])}{'; ' + r['law'] if r['law'] else ''} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def check_bounds(name, part, rows):
+    """What fell behind."""
+    bounds = tomllib.loads((HERE / "bounds.toml").read_text()).get(name, {}).get(part, {})
+    measured = grading.summary([r for r in rows if "failed" not in r])
+    out = [f"{part}: {r['number']} failed: {r['failed'][-200:]}" for r in rows if "failed" in r]
+    for measure, bound in bounds.items():
+        value = grading.number_of(measured[measure])
+        if value is None or value < bound.get("least", 0) or value > bound.get("most", 1):
+            out.append(f"{part}: {measure}: {measured[measure]}, allowed {bound}")
+    return out
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("vcnc")
+    parser.add_argument("--parts", type=lambda s: s.split(","), default=["independent", "own"])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kinds", type=generate.counts_of,
+                        default=generate.counts_of("clean=24,single=60,pair=12,triple=4,unknown=12,without=20"))
+    parser.add_argument("--individuals", type=int, default=4)
+    parser.add_argument("--work", type=pathlib.Path)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--numbers", type=lambda s: {int(n) for n in s.split(",")}, help="of the independent part, these runs only")
+    parser.add_argument("--markdown", type=pathlib.Path)
+    parser.add_argument("--bounds")
+    a = parser.parse_args()
+    work = a.work or pathlib.Path(tempfile.mkdtemp(prefix="diagnosis_bench_"))
+    parts = {}
+    for part in a.parts:
+        print(f"== {part}", flush=True)
+        folder = work / part.split("_")[0]
+        if part == "own":
+            parts[part] = own_part(a.vcnc, folder, a.seed, a.kinds, a.jobs)
+        elif part in ("independent", "independent_absolute"):
+            parts[part] = independent_part(a.vcnc, folder, a.seed, a.kinds, a.jobs, a.individuals, part.endswith("absolute"),
+                                           a.numbers)
+        elif part == "shuffled":
+            parts[part] = shuffled_part(a.vcnc, work / "independent", a.seed, 1)
+        else:
+            sys.exit(f"unknown part {part}: own, independent, independent_absolute, shuffled")
+        good = [r for r in parts[part] if "failed" not in r]
+        for k, v in (grading.summary(good) if good else {}).items():
+            print(f"  {k}: {v}")
+    if a.markdown:
+        a.markdown.write_text(markdown(parts, a.seed))
+    if a.work is None:
+        shutil.rmtree(work)
+    behind = [text for part, rows in parts.items() for text in check_bounds(a.bounds, part, rows)] if a.bounds else []
+    for text in behind:
+        print(text, file=sys.stderr)
+    return 1 if behind else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,102 @@
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "configs/config.hpp"
+#include "diagnosis/candidate.hpp"
+#include "diagnosis/effect_stage.hpp"
+#include "model/parameters.hpp"
+
+namespace vcnc {
+namespace {
+
+Machine machine() {
+  return load_machine(std::string(VCNC_SOURCE_DIR) + "/configs/machines/trunnion.toml");
+}
+
+bool is_shape(const Candidate& c, std::size_t i) {
+  return std::find(c.shape.begin(), c.shape.end(), i) != c.shape.end();
+}
+
+/// Of the file, only the lines of effects that are not as by default are written.
+TEST(Candidates, AmplitudesActAndShapesAloneDoNot) {
+  const Machine declared = machine();
+  std::size_t amplitudes = 0, shapes = 0;
+  for (const Candidate& c : candidates(declared)) {
+    if (c.effect == "deviation") continue;
+    for (std::size_t i = 0; i < c.numbers.size(); ++i) {
+      const FreeNumber& n = c.numbers[i];
+      Machine changed = declared;
+      ASSERT_LE(n.min, n.max);
+      if (is_shape(c, i)) {
+        ++shapes;
+        continue;
+      }
+      ++amplitudes;
+      EXPECT_GT(n.typical, 0) << n.key;
+      ASSERT_NO_THROW(set_parameter(changed, n.key, n.typical)) << n.key;
+      bool acts = false;
+      for_each_effect_of(changed.effects,
+                         [&](const auto& effect, std::size_t) { acts = acts || !effect.null(); });
+      EXPECT_TRUE(acts) << n.key;
+    }
+  }
+  EXPECT_GT(amplitudes, 200u);
+  EXPECT_GT(shapes, 80u);
+}
+
+TEST(Candidates, HaveEveryEffectThatCanBePredicted) {
+  std::set<std::string> named;
+  for (const Candidate& c : candidates(machine())) EXPECT_TRUE(named.insert(c.name()).second);
+  std::set<std::string> missing;
+  for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
+    bool found = false;
+    for (const std::string& name : named)
+      found = found || name.ends_with("." + std::string(Effect::text.name));
+    if (!found && no_hypothesis<Effect>().empty()) missing.emplace(Effect::text.name);
+    EXPECT_FALSE(found && !no_hypothesis<Effect>().empty()) << Effect::text.name;
+  });
+  EXPECT_EQ(missing, (std::set<std::string>{"bus_latency", "period_slip"}));
+  EXPECT_TRUE(named.contains("X.backlash") && named.contains("C.encoder_eccentricity") &&
+              named.contains("geometry.squareness") && named.contains("setup.piece_offset") &&
+              named.contains("axes.Y.load_kg.deviation"));
+}
+
+TEST(Candidates, PlayNeedsAMotorSide) {
+  Machine one_mass = machine();
+  one_mass.axes[kX].mechanics.motor_inertia = 0;
+  for (const Candidate& c : candidates(one_mass)) {
+    EXPECT_NE(c.name(), "X.backlash");
+    EXPECT_NE(c.name(), "X.windup");
+  }
+}
+
+TEST(Candidates, SidesAreThoseOfTheNullValue) {
+  for (const Candidate& c : candidates(machine())) {
+    if (c.name() == "X.backlash") {
+      EXPECT_TRUE(c.numbers[0].one_sided);
+    }
+    if (c.name() == "X.kv_error") {
+      EXPECT_FALSE(c.numbers[0].one_sided);
+    }
+    if (c.name() == "X.pitch_periodic") {
+      EXPECT_EQ(c.shape, (std::vector<std::size_t>{1, 2}));  // period and phase
+    }
+  }
+}
+
+TEST(AsHypothesis, TurnsChangedNumbersIntoDeviations) {
+  const Machine declared = machine();
+  Machine changed = declared;
+  changed.axes[kY].mechanics.load *= 1.1;
+  changed.effects.get<Squareness>().xy = 1e-6;
+  const Machine h = as_hypothesis(declared, changed);
+  EXPECT_EQ(h.axes[kY].mechanics.load, declared.axes[kY].mechanics.load);
+  ASSERT_EQ(h.effects.deviations.size(), 1u);
+  EXPECT_EQ(h.effects.deviations[0].key, "axes.Y.load_kg");
+  EXPECT_EQ(h.effects.get<Squareness>().xy, 1e-6);
+  EXPECT_DOUBLE_EQ(actual(h).axes[kY].mechanics.load, changed.axes[kY].mechanics.load);
+}
+
+}  // namespace
+}  // namespace vcnc

@@ -1,0 +1,147 @@
+#include "diagnosis/diagnose.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "toy_machine.hpp"
+
+namespace vcnc {
+namespace {
+
+Diagnosis diagnosed(const Record& record, const Machine& declared = {}) {
+  toy::ToyReplica replica(record);
+  return diagnose({record, replica, declared, toy::candidates()}, std::nullopt);
+}
+
+Record measured(const Machine& truth, std::uint64_t seed) {
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, truth, seed);
+  return record;
+}
+
+TEST(Diagnose, SaysNoDeviationOfAHealthyMachine) {
+  const Diagnosis d = diagnosed(measured({}, 1));
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::no_deviation);
+  EXPECT_TRUE(d.effects.empty());
+  EXPECT_FALSE(d.law);
+}
+
+TEST(Diagnose, ExplainsWithIntervalAndFigures) {
+  Machine truth;
+  move_number(truth, "effects.X.load_play.width_um", 2);
+  const Diagnosis d = diagnosed(measured(truth, 2));
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
+  ASSERT_EQ(d.effects.size(), 1U);
+  EXPECT_EQ(d.effects[0].name, "load_play");
+  // Twice the 95 % interval: one seed is no test of its coverage (Intervals).
+  const FittedNumber& width = d.effects[0].numbers[0];
+  EXPECT_NEAR(width.value, 2, width.high - width.low);
+  EXPECT_LT(width.high - width.low, 0.05);
+  EXPECT_NEAR(d.effects[0].contour_error_um, 1, 0.1);  // half the width, to and fro
+  for (const SignalFigure& f : d.figures) {
+    EXPECT_LE(f.after, 1.03 * f.floor);
+    if (f.channel.kind == SignalKind::deflection) {
+      EXPECT_GT(f.before, 5 * f.floor);
+    }
+  }
+}
+
+TEST(Diagnose, NamesALawWhereTheLibraryHasNone) {
+  // A displacement by a function of the other axis, which no candidate makes.
+  Record record = measured({}, 3);
+  const std::vector<double>& y = record.find(SignalKind::command, 1)->value;
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::deflection)
+      for (std::size_t k = 0; k < s.value.size(); ++k) s.value[k] += 3e-6 * std::cos(y[k] / 0.012);
+  const Diagnosis d = diagnosed(record);
+  ASSERT_TRUE(d.law);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::unexplained);
+}
+
+TEST(Diagnose, ReferenceRunCancelsWhatTheModelGetsWrong) {
+  // Healthy and sick machine share an error that the model knows nothing of.
+  const auto wrong = [](Record record) {
+    const std::vector<double>& x = record.find(SignalKind::command, 0)->value;
+    for (MeasuredSignal& s : record.signals)
+      if (is_compared(s.kind))
+        for (std::size_t k = 0; k < s.value.size(); ++k)
+          s.value[k] += (s.kind == SignalKind::force ? 30 : 2e-6) * std::sin(x[k] / 0.004);
+    return record;
+  };
+  Machine truth;
+  move_number(truth, "effects.geometry.squareness.xy_urad", 10);
+  const Record healthy = wrong(measured({}, 4)), sick = wrong(measured(truth, 5)),
+               well = wrong(measured({}, 6));
+  toy::ToyReplica of_healthy(healthy), of_sick(sick), of_well(well);
+  const Machine declared;
+  const Diagnosis d =
+      diagnose({sick, of_sick, declared, toy::candidates()}, HealthyRun{healthy, of_healthy});
+  EXPECT_TRUE(d.differential);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
+  ASSERT_EQ(d.effects.size(), 1U);
+  EXPECT_EQ(d.effects[0].name, "squareness");
+  const Diagnosis none =
+      diagnose({well, of_well, declared, toy::candidates()}, HealthyRun{healthy, of_healthy});
+  EXPECT_EQ(none.verdict, DiagnosisVerdict::no_deviation);
+}
+
+TEST(Diagnose, AttributesNothingToLapsShuffledBetweenConditions) {
+  Machine truth;
+  move_number(truth, "effects.X.load_play.width_um", 1);
+  const Machine declared;
+  for (std::uint64_t seed = 20; seed < 23; ++seed) {
+    Record record = measured(truth, seed);
+    toy::ToyReplica replica(record);
+    const std::vector<std::vector<double>> healthy = replica.predict(declared);
+    // Laps take their residual from another condition, those that are fitted from another one
+    // than those that are held out.
+    const Record from = record;
+    for (std::size_t s = 0; s < record.stretches.size(); ++s) {
+      const Stretch& to = from.stretches[s];
+      const std::size_t condition = (s / 4 + 1 + s % 2) % 3, lap = (s + seed) % 4;
+      const Stretch& of = from.stretches[4 * condition + lap];
+      for (std::size_t c = 0; c < healthy.size(); ++c) {
+        const ComparedChannel& channel = replica.channels()[c];
+        const std::vector<double>& y = from.find(channel.kind, channel.axis)->value;
+        for (MeasuredSignal& signal : record.signals)
+          if (signal.kind == channel.kind)
+            for (std::size_t k = 0; k < to.end - to.begin; ++k)
+              signal.value[to.begin + k] =
+                  healthy[c][to.begin + k] + y[of.begin + k] - healthy[c][of.begin + k];
+      }
+    }
+    const Diagnosis d = diagnosed(record);
+    EXPECT_TRUE(d.effects.empty()) << seed << ": " << d.effects.front().name;
+  }
+}
+
+TEST(Diagnose, KeepsWhatWasFoundWhenInterrupted) {
+  Machine truth;
+  move_number(truth, "effects.X.load_play.width_um", 2);
+  const Record record = measured(truth, 8);
+  toy::ToyReplica replica(record);
+  const Machine declared;
+  const Diagnosis d = diagnose({record, replica, declared, toy::candidates()}, std::nullopt, {},
+                               [](const DiagnosisProgress&) { return false; });
+  ASSERT_FALSE(d.warnings.empty());
+  EXPECT_NE(d.warnings.back().find("Interrupted"), std::string::npos);
+  EXPECT_FALSE(d.figures.empty());
+}
+
+TEST(Commission, FindsFrictionOfAHealthyMachine) {
+  Machine truth;
+  move_number(truth, "effects.X.coulomb.level_N", 120);
+  move_number(truth, "effects.X.viscous.coefficient_Ns_per_m", 900);
+  const Record record = measured(truth, 9);
+  toy::ToyReplica replica(record);
+  const Machine declared;
+  const Commissioning c = commission({record, replica, declared, toy::candidates()});
+  EXPECT_NEAR(number_of(c.machine, "effects.X.coulomb.level_N"), 120, 1.5);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.viscous.coefficient_Ns_per_m"), 900, 15);
+  ASSERT_EQ(c.notes.size(), 1U);
+  EXPECT_EQ(c.notes[0].find("X: dry and viscous friction,"), 0U) << c.notes[0];
+}
+
+}  // namespace
+}  // namespace vcnc

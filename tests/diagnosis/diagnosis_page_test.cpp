@@ -1,0 +1,128 @@
+#include "diagnosis/diagnosis_page.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "diagnosis/diagnosis_figures.hpp"
+#include "diagnosis/diagnosis_json.hpp"
+#include "diagnosis/diagnosis_text.hpp"
+
+namespace vcnc {
+namespace {
+
+FoundEffect backlash() {
+  FoundEffect e;
+  e.name = "backlash";
+  e.place = "X";
+  e.numbers = {{"effects.X.backlash.gap_um", 5.0321, 4.91, 5.15}};
+  e.gain = 812;
+  e.contour_error_um = 1.4;
+  e.class_with = {"X.windup"};
+  e.separating_program = "reversals";
+  return e;
+}
+
+Diagnosis found_backlash() {
+  Diagnosis d;
+  d.verdict = DiagnosisVerdict::partly;
+  d.differential = true;
+  d.explained_share = 0.87;
+  d.effects = {backlash()};
+  d.figures = {{{SignalKind::position, kX}, "held-out laps", 3e-6, 1e-6, 0.9e-6},
+               {{SignalKind::position, kC}, "test <run>", 2e-5, 1e-5, 0}};
+  d.excitation = {{"X.backlash", 0.1, true, ""},
+                  {"C.cogging", std::numeric_limits<double>::infinity(), false, "rotary"}};
+  d.ladder = {{"", 5000, {3e-6}}, {"X.backlash", 1200, {1e-6}}};
+  d.warnings = {"25 samples are missing"};
+  return d;
+}
+
+TEST(DiagnosisJson, HoldsAllThatWasFoundInTheUnitsOfItsNames) {
+  const auto json = nlohmann::json::parse(to_json(found_backlash(), "run.csv"));
+  EXPECT_EQ(json["verdict"], "PARTLY");
+  EXPECT_EQ(json["mode"], "differential");
+  EXPECT_EQ(json["explained_share"], 0.87);
+  const auto& effect = json["effects"][0];
+  EXPECT_EQ(effect["name"], "backlash");
+  EXPECT_EQ(effect["axis"], "X");
+  EXPECT_EQ(effect["parameters"][0]["key"], "effects.X.backlash.gap_um");
+  EXPECT_EQ(effect["parameters"][0]["low"], 4.91);
+  EXPECT_EQ(effect["class"][0], "X.windup");
+  EXPECT_EQ(effect["contour_error_um"], 1.4);
+  EXPECT_EQ(effect["minor"], false);
+  EXPECT_EQ(json["figures"][0]["unit"], "um");
+  EXPECT_NEAR(json["figures"][0]["rms_before"].get<double>(), 3, 1e-12);
+  EXPECT_EQ(json["figures"][1]["unit"], "arcsec");
+  EXPECT_NEAR(json["figures"][1]["rms_after"].get<double>(), 2.0626480624709636, 1e-9);
+  EXPECT_TRUE(json["excitation"][1]["detection_limit"].is_null());  // infinite
+  EXPECT_EQ(json["ladder"][1]["chi2"], 1200);
+  EXPECT_TRUE(json["law"].is_null());
+}
+
+TEST(DiagnosisText, BeginsWithTheVerdictAndHasNumbersWithIntervals) {
+  const std::string text = to_text(found_backlash());
+  EXPECT_EQ(text.find("PARTLY: what was added explains 87 %"), 0u) << text;
+  for (const char* part :
+       {"mode: differential", "X.backlash: gap_um = 5.03 [4.91 .. 5.15]", "or: X.windup",
+        "vcnc program reversals", "this run cannot show 1 of 2 candidates",
+        "warning: 25 samples are missing"})
+    EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+}
+
+TEST(DiagnosisText, DigitsFollowTheInterval) {
+  EXPECT_EQ(with_interval({"k", 1234.5678, 1200, 1270}), "1235 [1200 .. 1270]");
+  EXPECT_EQ(with_interval({"k", 0.0123456, 0.0121, 0.0126}), "0.01235 [0.01210 .. 0.01260]");
+  EXPECT_EQ(unit_of_key("effects.X.backlash.gap_um"), "um");
+  EXPECT_EQ(unit_of_key("no.such.key"), "");
+}
+
+/// A record whose X goes back and forth, with a residual that is half a step at every reversal.
+Record swinging() {
+  Record record;
+  record.source = "run.csv";
+  MeasuredSignal command;
+  command.kind = SignalKind::command;
+  for (int k = 0; k < 4000; ++k) command.value.push_back(0.05 * std::sin(2 * kPi * k / 1000.0));
+  record.signals = {command};
+  return record;
+}
+
+TEST(ExplainedBy, FindsWhatAResidualGoesAlongWith) {
+  const Record record = swinging();
+  std::vector<double> stepped, noise;
+  for (int k = 0; k < 4000; ++k) {
+    stepped.push_back(std::cos(2 * kPi * k / 1000.0) > 0 ? 1e-6 : -1e-6);
+    noise.push_back(1e-6 * std::sin(12.9898 * k * k));
+  }
+  const std::vector<RelatedQuantity> all = related_quantities(record);
+  ASSERT_EQ(all.size(), 4u);                       // position, speed, acceleration of X, time
+  EXPECT_GT(explained_by(all[0], stepped), 0.95);  // by direction
+  EXPECT_GT(explained_by(all[1], stepped), 0.85);
+  EXPECT_LT(explained_by(all[2], stepped), 0.1);
+  for (const RelatedQuantity& c : all) EXPECT_LT(explained_by(c, noise), 0.03) << c.name;
+}
+
+TEST(DiagnosisPage, TellsTheStoryInPicturesAndIsSelfContained) {
+  const Record record = swinging();
+  const Diagnosis d = found_backlash();
+  ModelResiduals residuals;
+  residuals.channels = {{SignalKind::position, kX}};
+  residuals.before.emplace_back();
+  residuals.after.emplace_back();
+  for (int k = 0; k < 4000; ++k) {
+    residuals.before[0].push_back(std::cos(2 * kPi * k / 1000.0) > 0 ? 1e-6 : -1e-6);
+    residuals.after[0].push_back(1e-7 * std::sin(12.9898 * k * k));
+  }
+  const std::string page = diagnosis_page({d, record, residuals});
+  EXPECT_EQ(page.find("<!DOCTYPE html>\n" + std::string(kDiagnosisMark) + "\n"), 0u);
+  for (const char* part : {"PARTLY", "backlash", "5.03 [4.91 .. 5.15]", "What it goes along with",
+                           "position X", "One effect after the other", "not excited",
+                           "vcnc program rotary", "test &lt;run&gt;", "25 samples are missing"})
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+  EXPECT_EQ(page.find("src="), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vcnc

@@ -1,0 +1,148 @@
+// The parts of the engine against closed forms: filters, solver, partition, limits, intervals.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "diagnosis/intervals.hpp"
+#include "diagnosis/least_squares.hpp"
+#include "diagnosis/noise_audit.hpp"
+#include "diagnosis/selection.hpp"
+#include "toy_machine.hpp"
+
+namespace vcnc {
+namespace {
+
+TEST(NoiseAudit, RecoversAnAutoregressiveProcess) {
+  // r_k = 0.8 r_{k-1} - 0.3 r_{k-2} + e: its autocovariances by the Yule-Walker equations.
+  const double a1 = 0.8, a2 = -0.3, s2 = 2.5;
+  std::vector<double> c(13);
+  const double rho1 = a1 / (1 - a2);
+  c[0] = s2 / (1 - a1 * rho1 - a2 * (a1 * rho1 + a2));
+  c[1] = rho1 * c[0];
+  for (std::size_t j = 2; j < c.size(); ++j) c[j] = a1 * c[j - 1] + a2 * c[j - 2];
+  const WhiteningFilter f = fit_autoregression(c);
+  EXPECT_NEAR(f.a[0], a1, 1e-6);
+  EXPECT_NEAR(f.a[1], a2, 1e-6);
+  for (std::size_t j = 2; j < f.a.size(); ++j) {
+    EXPECT_NEAR(f.a[j], 0, 1e-6);
+  }
+  EXPECT_NEAR(f.scale, std::sqrt(s2), 1e-6);
+}
+
+TEST(NoiseAudit, TellsFrequencyAndAmplitudeOfWhatDoesNotRepeat) {
+  Record record = toy::commands(2048, 4);
+  toy::measure(record, Machine(), 5);
+  // 83.3 Hz does not fit into a lap of 2.048 s.
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::deflection)
+      for (std::size_t k = 0; k < s.value.size(); ++k)
+        s.value[k] += 60e-9 * std::sin(2 * kPi * 83.3 * 1e-3 * static_cast<double>(k));
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, Machine());
+  ASSERT_FALSE(evidence.noise().lines.empty());
+  const NoiseLine& line = evidence.noise().lines.front();
+  EXPECT_EQ(line.channel.kind, SignalKind::deflection);
+  EXPECT_NEAR(line.frequency, 83.3, 0.1);
+  EXPECT_NEAR(line.amplitude, 60e-9, 15e-9);
+
+  Record quiet = toy::commands(2048, 4);
+  toy::measure(quiet, Machine(), 6);
+  toy::ToyReplica of_quiet(quiet);
+  EXPECT_TRUE(Evidence(quiet, of_quiet, Machine()).noise().lines.empty());
+}
+
+TEST(Evidence, CleanResidualIsChiSquareWithOnePerSample) {
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, Machine(), 1);
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, Machine());
+  const Column z = evidence.residual(evidence.predict(Machine()));
+  for (const Role role : {Role::fitted, Role::held_out}) {
+    const double n = evidence.count(role);
+    // Standard deviation of chi-square and of the variance that was estimated from as many samples.
+    EXPECT_NEAR(evidence.chi2(z, role), n, 5 * std::sqrt(4 * n));
+  }
+}
+
+TEST(Partition, HoldsOutEveryOtherLapOfEveryCondition) {
+  const Record record = toy::commands(1000, 4);
+  const Partition p = partition(record);
+  EXPECT_TRUE(p.repeated);
+  EXPECT_EQ(p.conditions(), 3U);
+  for (const Block& b : p.blocks) EXPECT_EQ(b.held_out, p.stretches[b.stretch].repetition % 2 == 1);
+}
+
+TEST(LeastSquares, SolvesRosenbrockWithinBounds) {
+  LeastSquaresProblem problem;
+  problem.start = Eigen::Vector2d(-1.2, 1);
+  problem.min = Eigen::Vector2d(-5, -5);
+  problem.max = Eigen::Vector2d(5, 5);
+  problem.max_iterations = 100;
+  problem.cost_tolerance = 1e-14;
+  problem.evaluate = [](const Eigen::VectorXd& x, bool) {
+    const Eigen::Vector2d r(10 * (x[1] - x[0] * x[0]), 1 - x[0]);
+    Eigen::Matrix2d j;
+    j << -20 * x[0], 10, -1, 0;
+    return Linearisation{r.squaredNorm(), j.transpose() * r, j.transpose() * j};
+  };
+  LeastSquaresSolution s = solve(problem);
+  EXPECT_NEAR(s.x[0], 1, 1e-5);
+  EXPECT_NEAR(s.x[1], 1, 1e-5);
+  // With x0 <= 0.5 the minimum is at the bound, on the parabola.
+  problem.max[0] = 0.5;
+  s = solve(problem);
+  EXPECT_NEAR(s.x[0], 0.5, 1e-5);
+  EXPECT_NEAR(s.x[1], 0.25, 1e-4);
+}
+
+TEST(Screening, DetectionLimitIsFiveStandardDeviations) {
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, Machine(), 2);
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, Machine());
+  const std::vector<Candidate> all = toy::candidates();
+  const SelectionResult result = select_effects_of(evidence, Machine(), all, {}, {});
+  // command_delay: e = -t v in the position with 50 nm of noise, and -t v at the probe with 100 nm.
+  double sum = 0;
+  const std::vector<double>& x = record.find(SignalKind::command, 0)->value;
+  for (std::size_t k = 1; k + 1 < x.size(); ++k) {
+    const double v = (x[k + 1] - x[k - 1]) / 2e-3, a = (x[k + 1] - 2 * x[k] + x[k - 1]) / 1e-6;
+    if (std::abs(a) > 100) continue;
+    sum += v * v * (1 / std::pow(toy::kPositionNoise, 2) + 1 / std::pow(toy::kProbeNoise, 2));
+  }
+  EXPECT_NEAR(result.trials.front().detection_limit, 5 / std::sqrt(sum) * 1e3,
+              0.05 * 5 / std::sqrt(sum) * 1e3);
+}
+
+TEST(Intervals, CoverTheTruthAsOftenAsTheySay) {
+  const std::vector<Candidate> all = toy::candidates();
+  int inside = 0, numbers = 0;
+  for (std::uint64_t seed = 1000; seed < 1050; ++seed) {
+    Record record = toy::commands(400, 4);
+    Machine truth;
+    move_number(truth, "effects.X.scale_error.error_ppm", 20);
+    move_number(truth, "effects.X.load_play.width_um", 1);
+    move_number(truth, "axes.X.load_kg", 500 * (1 + 0.01 * gaussian_noise(seed, 77, 0)[0]));
+    toy::measure(record, truth, seed);
+    toy::ToyReplica replica(record);
+    Evidence evidence(record, replica, Machine());
+    FittedMachine m = fit_declared(evidence, Machine());
+    for (const std::size_t c : {3U, 4U}) {
+      FreedNumber n{.number = all[c].numbers[0], .value = 5};
+      m.added.push_back({.candidate = c, .numbers = {n}, .gain = 0, .class_with = {}});
+    }
+    converge(evidence, m);
+    const auto intervals = intervals_of(evidence, m);
+    for (const FreedNumber& n : m.numbers()) {
+      const double error = n.value - number_of(truth, n.number.key);
+      inside += std::abs(error) <= intervals.at(n.number.key).half_width;
+      ++numbers;
+    }
+  }
+  // Binomial, 100 trials of 95 %: within about three standard deviations, the safe side above.
+  EXPECT_GE(inside, 0.88 * numbers);
+  EXPECT_LE(inside, 0.999 * numbers);
+}
+
+}  // namespace
+}  // namespace vcnc

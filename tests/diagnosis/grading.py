@@ -1,0 +1,184 @@
+"""How a diagnosis is graded against its answer key, and how many grades become one table.
+
+Definitions. L of an effect: the detection limit that the diagnosis itself states for its first number in
+its excitation table. Strata of single effects: weak below 3 L, strong from 3 L on; below L, or where
+the run does not excite the effect at all, silence is the right answer. A name is right when effect
+and place are; a declared number found out of tolerance is right when it belongs to the effect. An attribution
+is an effect that the report does not call minor.
+"""
+
+import math
+import re
+import statistics
+
+SILENT = ("NO DEVIATION", "NOT IDENTIFIABLE")
+OPEN = ("UNEXPLAINED", "PARTLY")
+
+# The same motion under two names, which no record can tell apart.
+ALIASES = {"bus_latency": "command_delay"}
+
+# Where the force, displacement or reading of an effect may show up as a law.
+HOOKS = {
+    "reception": ("command", "command_time"), "setpoint": ("command", "command_time"),
+    "servo": ("command", "command_time", "motor_force", "table_force"),
+    "encoder": ("command", "displacement", "motor_force", "table_force"),
+    "motor force": ("motor_force", "table_force"), "transmission": ("displacement", "table_force", "motor_force"),
+    "load force": ("table_force", "motor_force"), "friction": ("table_force", "motor_force"),
+    "displacement": ("displacement", "reading"), "pose": ("displacement", "reading"),
+    "touch": ("reading", "displacement"), "deflection": ("reading", "displacement"),
+    "analogue": ("reading", "displacement"), "reading": ("reading", "displacement"),
+}
+
+
+def same(effect, found):
+    """Whether a found effect is the true one."""
+    name, place = effect["name"], effect["place"]
+    if found["name"] in (name, ALIASES.get(name)):
+        return found["axis"] == place
+    if found["name"] == "deviation":
+        key = found["axis"]
+        if name == "load_mass":
+            return key.startswith(f"axes.{place}.load_")
+        return key.startswith(f"effects.{place}.{name}.")
+    return False
+
+
+def label(e):
+    return f"{e['name']} {e.get('axis', e.get('place'))}"
+
+
+def claims(report):
+    return [e for e in report.get("effects", []) if not e.get("minor", False)]
+
+
+def in_class(effect, found):
+    return any(text in (f"{effect['place']}.{effect['name']}", f"{effect['name']} {effect['place']}",
+                        f"effects.{effect['place']}.{effect['name']}") or
+               text.startswith(f"effects.{effect['place']}.{effect['name']}.") for text in found.get("class", []))
+
+
+def limit_of(report, effect):
+    """Detection limit in the unit of the first number; None: the report says nothing of it."""
+    for row in report.get("excitation", []):
+        if row["name"] == f"{effect['place']}.{effect['name']}":
+            value = row.get("detection_limit")
+            return math.inf if value is None or not row.get("excited", True) else float(value)
+    return None
+
+
+def first_number(effect):
+    for key, value in effect["parameters"].items():
+        if isinstance(value, list):
+            return abs(value[0])
+        return abs(value)
+    return 0.0
+
+
+def numbers_of(found):
+    return {n["key"]: n for n in found.get("parameters", [])}
+
+
+def grade(answer, report, seconds):
+    """One row."""
+    told = claims(report)
+    row = {"kind": answer["kind"], "truth": [label(e) for e in answer["effects"]] or [answer.get("unknown", "")],
+           "told": [label(e) for e in told], "verdict": report["verdict"], "seconds": seconds,
+           "law": (report.get("law") or {}).get("behaves_like", ""), "number": answer.get("number"),
+           "claims": len(told)}
+    effects = answer["effects"]
+    if answer.get("without"):
+        row["kind"] = "without"
+    if effects:
+        row["right"] = [any(same(e, f) for f in told) for e in effects]
+        row["top"] = bool(told) and any(same(e, told[0]) for e in effects)
+        row["class"] = max((1 / (1 + len(told[0].get("class", []))) for e in effects
+                            if same(e, told[0]) or in_class(e, told[0])), default=0.0) if told else 0.0
+        row["exact"] = all(row["right"]) and len(told) == len(effects)
+        limits = [limit_of(report, e) for e in effects]
+        sizes = [first_number(e) for e in effects]
+        row["strength"] = math.nan if None in limits else min(s / l if l else math.inf for s, l in zip(sizes, limits))
+        row["silent"] = not told and report["verdict"].startswith(SILENT)
+        row["errors"], row["covered"] = [], []
+        for e, l in zip(effects, limits):
+            for f in told:
+                if not same(e, f):
+                    continue
+                for key, number in numbers_of(f).items():
+                    true = answer.get("values", {}).get(key)
+                    if true is None or re.search(r"phase|angle_deg", key):
+                        continue
+                    # L belongs to the first number only
+                    scale = abs(true) if l in (None, math.inf) else max(abs(true), 1e-12)
+                    row["errors"].append(abs(number["value"] - true) / max(scale, 1e-12))
+                    row["covered"].append(number["low"] <= true <= number["high"])
+    if row["kind"] in ("unknown", "without"):
+        law = report.get("law") or {}
+        row["rejected"] = report["verdict"].startswith(OPEN)
+        row["law_right"] = bool(law) and law.get("axis") in answer["law_axes"] and law.get("point") in answer["law_points"]
+    ratios = []
+    for f in report.get("figures", []):
+        if f.get("rms_floor") and "held" in f["run"]:
+            ratios.append(f["rms_after"] / f["rms_floor"])
+    row["after_over_floor"] = max(ratios) if ratios else None
+    return row
+
+
+def share(flags):
+    flags = list(flags)
+    return f"{sum(flags)}/{len(flags)} ({100 * sum(flags) / len(flags):.1f} %)" if flags else "none drawn"
+
+
+def percentile(values, p):
+    values = sorted(values)
+    return values[min(len(values) - 1, int(p / 100 * len(values)))] if values else math.nan
+
+
+def summary(rows):
+    """Metric -> text, of the rows of one part."""
+    out = {}
+    clean = [r for r in rows if r["kind"] == "clean"]
+    single = [r for r in rows if r["kind"] == "single"]
+    strong = [r for r in single if r["strength"] >= 3]
+    weak = [r for r in single if 1 <= r["strength"] < 3]
+    blind = [r for r in single if r["strength"] < 1]
+    untold = [r for r in single if math.isnan(r["strength"])]
+    out["clean machines accused"] = share(r["claims"] > 0 for r in clean)
+    out["single: top-1 name and place, all"] = share(r["top"] for r in single)
+    out["single: top-1, strong (from 3 L)"] = share(r["top"] for r in strong)
+    out["single: top-1, weak (1 to 3 L)"] = share(r["top"] for r in weak)
+    out["single: below L, silent"] = share(r["silent"] for r in blind)
+    if untold:
+        out["single: no limit stated, top-1"] = share(r["top"] for r in untold)
+    out["single: exactly the truth and nothing else"] = share(r["exact"] for r in single)
+    out["single: mean class score"] = f"{statistics.mean(r['class'] for r in single):.3f}" if single else "none drawn"
+    for kind in ("pair", "triple"):
+        some = [r for r in rows if r["kind"] == kind]
+        out[f"{kind}: exact set"] = share(r["exact"] for r in some)
+        out[f"{kind}: effects found"] = share(flag for r in some for flag in r["right"])
+        out[f"{kind}: claims that are true"] = share(
+            [True] * sum(sum(r["right"]) for r in some) + [False] * sum(max(0, r["claims"] - sum(r["right"])) for r in some))
+    for kind, text in (("unknown", "outside the library"), ("without", "left out of the library")):
+        some = [r for r in rows if r["kind"] == kind]
+        out[f"{text}: not explained away"] = share(r["rejected"] for r in some)
+        out[f"{text}: law named, of those"] = share(r["law_right"] for r in some if r["rejected"])
+    errors = [e for r in rows for e in r.get("errors", [])]
+    covered = [c for r in rows for c in r.get("covered", [])]
+    out["parameter error, median / p95"] = (
+        f"{100 * statistics.median(errors):.1f} % / {100 * percentile(errors, 95):.0f} % (n = {len(errors)})" if errors else "none")
+    out["95 % intervals that hold the truth"] = share(covered)
+    ratios = [r["after_over_floor"] for r in single if r["top"] and r["after_over_floor"]]
+    out["held-out RMS after / floor, worst signal, median / p95"] = (
+        f"{statistics.median(ratios):.3f} / {percentile(ratios, 95):.3f}" if ratios else "none")
+    moved = [r["transfer"] for r in rows if "transfer" in r]
+    if moved:
+        out["circles to S piece: error left of the declared model's, median / p95"] = (
+            f"{100 * statistics.median(moved):.1f} % / {100 * percentile(moved, 95):.0f} % (n = {len(moved)})")
+    seconds = [r["seconds"] for r in rows]
+    out["processor time of a diagnosis, median / largest [s]"] = f"{statistics.median(seconds):.1f} / {max(seconds):.1f}"
+    return out
+
+
+def number_of(text):
+    """12/13 (92.3 %) -> 0.923, None where nothing was drawn."""
+    found = re.match(r"(\d+)/(\d+)", text)
+    return int(found[1]) / int(found[2]) if found and int(found[2]) else None

@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+"""The grader against reports whose grade is plain."""
+
+import math
+import pathlib
+import sys
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+
+import grading
+
+TRUTH = {"kind": "single", "number": 3, "effects": [{"name": "backlash", "place": "X", "parameters": {"gap_um": 4.0}}],
+         "values": {"effects.X.backlash.gap_um": 4.0}}
+
+
+def report(*effects, verdict="EXPLAINED", **more):
+    return {"verdict": verdict, "effects": list(effects), **more}
+
+
+def found(name, axis, key="", value=0.0, low=0.0, high=0.0, **more):
+    return {"name": name, "axis": axis, "parameters": [{"key": key, "value": value, "low": low, "high": high}] if key else [], **more}
+
+
+class Grading(unittest.TestCase):
+    def test_right_name_and_place(self):
+        limit = [{"name": "X.backlash", "detection_limit": 0.5, "excited": True}]
+        row = grading.grade(TRUTH, report(found("backlash", "X", "effects.X.backlash.gap_um", 4.1, 3.9, 4.2), excitation=limit), 1)
+        self.assertTrue(row["top"] and row["exact"])
+        self.assertEqual(row["strength"], 8)
+        self.assertAlmostEqual(row["errors"][0], 0.025)
+        self.assertEqual(row["covered"], [True])
+
+    def test_wrong_axis_is_wrong(self):
+        row = grading.grade(TRUTH, report(found("backlash", "Y")), 1)
+        self.assertFalse(row["top"] or row["exact"])
+
+    def test_a_second_claim_spoils_the_set_but_not_a_minor_one(self):
+        two = grading.grade(TRUTH, report(found("backlash", "X"), found("kv_error", "X")), 1)
+        self.assertTrue(two["top"] and not two["exact"])
+        minor = grading.grade(TRUTH, report(found("backlash", "X"), found("kv_error", "X", minor=True)), 1)
+        self.assertTrue(minor["exact"])
+
+    def test_everything_is_possible_earns_nothing(self):
+        row = grading.grade(TRUTH, report(found("backlash", "X", **{"class": ["X.windup"] * 9})), 1)
+        self.assertAlmostEqual(row["class"], 0.1)
+
+    def test_interval_that_misses(self):
+        row = grading.grade(TRUTH, report(found("backlash", "X", "effects.X.backlash.gap_um", 5, 4.9, 5.1)), 1)
+        self.assertEqual(row["covered"], [False])
+
+    def test_declared_number_out_of_tolerance(self):
+        truth = {"kind": "single", "effects": [{"name": "coulomb", "place": "Y", "parameters": {"share_percent": 30}}]}
+        self.assertTrue(grading.grade(truth, report(found("deviation", "effects.Y.coulomb.level_N")), 1)["top"])
+        self.assertFalse(grading.grade(truth, report(found("deviation", "effects.X.coulomb.level_N")), 1)["top"])
+
+    def test_below_the_limit_silence_is_right(self):
+        row = grading.grade(TRUTH, report(verdict="NO DEVIATION", excitation=[{"name": "X.backlash", "detection_limit": 9, "excited": True}]), 1)
+        self.assertLess(row["strength"], 1)
+        self.assertTrue(row["silent"])
+
+    def test_unknown_must_not_be_explained(self):
+        truth = {"kind": "unknown", "effects": [], "unknown": "hose", "law_axes": ["X"], "law_points": ["table_force"]}
+        law = {"axis": "X", "point": "table_force", "behaves_like": ""}
+        self.assertTrue(grading.grade(truth, report(verdict="UNEXPLAINED", law=law), 1)["law_right"])
+        self.assertFalse(grading.grade(truth, report(found("cable_chain", "X")), 1)["rejected"])
+
+    def test_summary_counts(self):
+        limit = {"excitation": [{"name": "X.backlash", "detection_limit": 1, "excited": True}]}
+        rows = [grading.grade(TRUTH, report(found("backlash", "X"), **limit), 1), grading.grade(TRUTH, report(**limit), 1),
+                grading.grade({"kind": "clean", "effects": []}, report(found("backlash", "X")), 1)]
+        out = grading.summary(rows)
+        self.assertEqual(grading.number_of(out["single: top-1, strong (from 3 L)"]), 0.5)
+        self.assertEqual(grading.number_of(out["clean machines accused"]), 1)
+        self.assertIsNone(grading.number_of(out["single: top-1, weak (1 to 3 L)"]))
+
+    def test_no_limit_stated(self):
+        self.assertTrue(math.isnan(grading.grade(TRUTH, report(), 1)["strength"]))
+
+
+if __name__ == "__main__":
+    unittest.main()

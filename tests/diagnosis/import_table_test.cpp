@@ -1,0 +1,382 @@
+#include "diagnosis/import_table.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <random>
+
+#include "configs/config.hpp"
+#include "diagnosis/any_record.hpp"
+#include "diagnosis/record_check.hpp"
+#include "diagnosis/record_file.hpp"
+
+namespace vcnc {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kRows = 6000;
+constexpr double kStep = 1e-3;
+
+/// Ball-screw axis that swings by 80 mm in 2 s, and another one by 50 mm in 3 s.
+struct LinearAxis {
+  static double position(double t) { return 0.08 * std::sin(kPi * t); }
+  static double velocity(double t) { return 0.08 * kPi * std::cos(kPi * t); }
+  static double force(double t) {
+    const double v = velocity(t), a = -0.08 * kPi * kPi * std::sin(kPi * t);
+    return 100 * a + 200 * v + 20 * std::tanh(v / 1e-3);
+  }
+  static double other(double t) { return 0.05 * std::sin(2 * kPi / 3 * t + 1); }
+};
+
+using Columns = std::map<std::string, std::function<double(double)>>;
+
+const Columns& columns() {
+  static const Columns all{
+      {"t", [](double t) { return t; }},
+      {"cmd", [](double t) { return LinearAxis::position(t); }},
+      {"pos", [](double t) { return LinearAxis::position(t - 0.004); }},
+      {"vel", [](double t) { return LinearAxis::velocity(t - 0.004); }},
+      {"force", [](double t) { return LinearAxis::force(t - 0.004); }},
+      {"cmd2", [](double t) { return LinearAxis::other(t); }},
+      {"pos2", [](double t) { return LinearAxis::other(t - 0.004); }},
+  };
+  return all;
+}
+
+MeasuredTable table_of(const Columns& all, std::size_t rows = kRows) {
+  MeasuredTable table{.source = "run.csv", .columns = {}, .line = {}, .notes = {}};
+  std::mt19937 random(7);
+  for (const auto& [name, f] : all) {
+    MeasuredColumn& c = table.columns.emplace_back();
+    c.name = name;
+    for (std::size_t k = 0; k < rows; ++k) {
+      // A uniform noise of a millionth of the size, so that nothing is quantised by accident.
+      const double noise = static_cast<double>(random()) / 4294967296.0 - 0.5;
+      const double v = f(static_cast<double>(k) * kStep);
+      c.value.push_back(name == "t" ? v : v + 2e-7 * noise * std::max(1.0, std::abs(v)));
+    }
+  }
+  for (std::size_t k = 0; k < rows; ++k) table.line.push_back(k + 2);
+  return table;
+}
+
+std::string signal(const std::string& column, const std::string& kind, const std::string& axis,
+                   const std::string& unit, const std::string& more = "") {
+  return fmt::format(
+      "[[signals]]\ncolumn = \"{}\"\nkind = \"{}\"\naxis = \"{}\"\nunit = \"{}\"\n{}\n", column,
+      kind, axis, unit, more);
+}
+
+const std::string kTime = "[time]\ncolumn = \"t\"\nunit = \"s\"\n";
+
+std::string sound_map() {
+  return kTime + signal("cmd", "command", "X", "m") + signal("pos", "position", "X", "m") +
+         signal("vel", "velocity", "X", "m/s") + signal("force", "force", "X", "N");
+}
+
+Machine declared() {
+  return parse_machine(
+      "name = \"axis\"\n[axes.X]\nmin_mm = -150\nmax_mm = 150\nvelocity_mm_s = 500\nload_kg = 90\n"
+      "motor_inertia_kgm2 = 1e-5\ntravel_per_turn_mm = 10\n",
+      "axis.toml");
+}
+
+Record imported(const std::string& map, const MeasuredTable& table = table_of(columns())) {
+  const Machine machine = declared();
+  return import_table(table, parse_import_map(map, "map.toml"), "map.toml", &machine);
+}
+
+std::string refusal(const std::string& map, const MeasuredTable& table = table_of(columns())) {
+  try {
+    imported(map, table);
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+bool warned(const Record& record, const std::string& part) {
+  for (const std::string& w : record.warnings)
+    if (w.find(part) != std::string::npos) return true;
+  return false;
+}
+
+std::string all_warnings(const Record& record) {
+  std::string all;
+  for (const std::string& w : record.warnings) all += w + "\n";
+  return all;
+}
+
+TEST(ImportTable, ASoundTableBecomesARecordInSiWithItsLapsAndNoComplaint) {
+  const Record record = imported(sound_map());
+  EXPECT_EQ(record.samples(), kRows);
+  EXPECT_NEAR(record.period, 1e-3, 1e-12);
+  const MeasuredSignal* force = record.find(SignalKind::force, 0);
+  ASSERT_NE(force, nullptr);
+  EXPECT_NEAR(force->value[1000], LinearAxis::force(0.996), 1e-4);
+  EXPECT_EQ(force->source, "force");
+  EXPECT_GE(record.stretches.size(), 2u);
+  EXPECT_EQ(record.warnings.size(), 0u) << all_warnings(record);
+}
+
+TEST(ImportTable, UnitScaleSignAndOffsetComeOutInSi) {
+  Columns all = columns();
+  all["pos"] = [](double t) { return -1e6 * (LinearAxis::position(t - 0.004) - 0.001); };
+  all["force"] = [](double t) { return LinearAxis::force(t - 0.004) / 35.15; };
+  const Record record =
+      imported(kTime + signal("cmd", "command", "X", "m") +
+                 signal("pos", "position", "X", "um", "sign = -1\noffset = 1000") +
+                 signal("force", "force", "X", "N", "scale = 35.15"),
+             table_of(all));
+  EXPECT_NEAR(record.find(SignalKind::position, 0)->value[500], LinearAxis::position(0.496), 1e-6);
+  EXPECT_NEAR(record.find(SignalKind::force, 0)->value[500], LinearAxis::force(0.496), 1e-3);
+}
+
+TEST(ImportTable, TwoEncodersOfARobotJointBecomePositionAndTwist) {
+  Columns all = columns();
+  all["motor"] = [](double t) { return 5 * LinearAxis::position(t); };
+  all["load"] = [](double t) { return 5 * LinearAxis::position(t) - 1e-3 * std::sin(t); };
+  const Record record = imported(kTime + "[[axes]]\nname = \"joint 2\"\nplace = \"C\"\n" +
+                                   signal("motor", "motor_position", "joint 2", "rad") +
+                                   signal("load", "load_position", "joint 2", "rad"),
+                               table_of(all));
+  ASSERT_EQ(record.signals.size(), 2u);
+  const MeasuredSignal* twist = record.find(SignalKind::twist, kC);
+  ASSERT_NE(twist, nullptr);
+  EXPECT_NEAR(twist->value[2000], -1e-3 * std::sin(2.0), 2e-6);
+  EXPECT_EQ(record.find(SignalKind::position, kC)->source, "motor");
+  EXPECT_EQ(twist->source, "load - motor");
+}
+
+TEST(ImportTable, GapsAndMissingValuesStayMissingAndAreTold) {
+  MeasuredTable table = table_of(columns());
+  for (MeasuredColumn& c : table.columns) {
+    c.value.erase(c.value.begin() + 2000, c.value.begin() + 2010);
+    if (c.name == "pos") c.value[100] = kMissing;
+  }
+  const Record record = imported(sound_map(), table);
+  EXPECT_EQ(record.samples(), kRows);
+  const MeasuredSignal* pos = record.find(SignalKind::position, 0);
+  EXPECT_TRUE(std::isnan(pos->value[100]));
+  EXPECT_TRUE(std::isnan(pos->value[2005]));
+  EXPECT_NEAR(pos->value[2010], LinearAxis::position(2.006), 1e-6);
+  EXPECT_TRUE(warned(record, "10 samples are missing in 1 gap")) << all_warnings(record);
+  EXPECT_TRUE(warned(record, "\"pos\": 1 of 5990 values are missing")) << all_warnings(record);
+}
+
+TEST(ImportTable, LapsByTimeAndByColumn) {
+  const Record by_time = imported(sound_map() +
+                                "[[laps]]\nfrom_s = 0\nto_s = 2\ncondition = \"swing\"\n"
+                                "[[laps]]\nfrom_s = 2\nto_s = 4\ncondition = \"swing\"\n"
+                                "[[laps]]\nfrom_s = 4\nto_s = 5\ncondition = \"rest\"\n");
+  ASSERT_EQ(by_time.stretches.size(), 3u);
+  EXPECT_EQ(by_time.stretches[1].begin, 2000u);
+  EXPECT_EQ(by_time.stretches[1].end, 4000u);
+  EXPECT_EQ(by_time.stretches[1].condition, by_time.stretches[0].condition);
+  EXPECT_EQ(by_time.stretches[1].repetition, 1);
+  EXPECT_NE(by_time.stretches[2].condition, by_time.stretches[0].condition);
+  Columns all = columns();
+  all["lap"] = [](double t) { return std::floor(t / 2 + 1e-9); };
+  MeasuredTable table = table_of(all);
+  for (MeasuredColumn& c : table.columns)
+    if (c.name == "lap")
+      for (double& v : c.value) v = std::round(v);
+  const Record by_column = imported("lap_column = \"lap\"\n" + sound_map(), table);
+  ASSERT_EQ(by_column.stretches.size(), 3u);
+  EXPECT_EQ(by_column.stretches[2].begin, 4000u);
+  EXPECT_EQ(by_column.stretches[2].repetition, 2);
+}
+
+TEST(ImportTable, RefusesWhatTheMapCannotMean) {
+  EXPECT_NE(refusal(kTime + signal("posi", "position", "X", "m"))
+                .find("map.toml:5: signals.column: \"posi\" is no column of run.csv; did you mean "
+                      "\"pos\"?"),
+            std::string::npos)
+      << refusal(kTime + signal("posi", "position", "X", "m"));
+  EXPECT_NE(refusal(kTime + "[[signals]]\nnumber = 90\nkind = \"position\"\naxis = \"X\"\nunit = "
+                            "\"m\"\n")
+                .find("column 90 is not there, run.csv has 7"),
+            std::string::npos);
+  // By its heading and by its number: still the same column.
+  EXPECT_NE(refusal(kTime + signal("cmd", "command", "X", "m") +
+                    "[[signals]]\nnumber = 1\nkind = \"position\"\naxis = \"X\"\nunit = \"m\"\n")
+                .find("column \"cmd\" is used as command of X already"),
+            std::string::npos);
+  MeasuredTable table = table_of(columns());
+  table.columns[3].bad_line = 17;
+  table.columns[3].bad_text = "err";
+  EXPECT_NE(refusal(sound_map(), table).find("run.csv:17: \"err\" in column"), std::string::npos);
+  EXPECT_NE(refusal(sound_map(), table_of(columns(), 40)).find("too short a run"),
+            std::string::npos);
+}
+
+/// What a user is most likely to get wrong, each with the words that must name it.
+TEST(ImportTable, NamesWrongUnitsSignsAndSwappedColumns) {
+  const std::string cmd = signal("cmd", "command", "X", "m"),
+                    pos = signal("pos", "position", "X", "m"),
+                    cmd2 = signal("cmd2", "command", "Y", "m"),
+                    pos2 = signal("pos2", "position", "Y", "m");
+  struct Case {
+    const char* what;
+    std::string map;
+    std::vector<std::string> words;
+  };
+  const std::vector<Case> cases{
+      {"velocity in mm/s said to be m/s",
+       kTime + pos + signal("vel", "velocity", "X", "m/s", "scale = 1000"),
+       {"1000 times the derivative", "m and mm"}},
+      {"velocity with the wrong sign",
+       kTime + pos + signal("vel", "velocity", "X", "m/s", "sign = -1"),
+       {"-1 times the derivative", "sign"}},
+      {"position in mm said to be m",
+       kTime + cmd + signal("pos", "position", "X", "m", "scale = 1000"),
+       {"1000", "m and mm"}},
+      {"position and velocity swapped",
+       kTime + signal("vel", "position", "X", "m") + signal("pos", "velocity", "X", "m/s"),
+       {"swapped"}},
+      {"positions of two axes swapped",
+       kTime + cmd + cmd2 + signal("pos2", "position", "X", "m") +
+           signal("pos", "position", "Y", "m"),
+       {"follows \"cmd2\"", "swapped"}},
+      {"command counts the other way",
+       kTime + pos + signal("cmd", "command", "X", "m", "sign = -1"),
+       {"moves against", "signs"}},
+      {"time in ms said to be s",
+       "[time]\ncolumn = \"t\"\nunit = \"ms\"\n" + cmd + pos,
+       {"declared limit", "1000"}},
+      {"force with the wrong sign",
+       kTime + cmd + pos + signal("force", "force", "X", "N", "sign = -1"),
+       {"against the acceleration", "sign must be -1"}},
+      {"force of the other axis",
+       kTime + pos + pos2 + signal("force", "force", "Y", "N"),
+       {"belongs to the motion of \"pos\"", "swapped"}},
+      {"nothing to compare", kTime + cmd, {"no signal can be compared"}},
+  };
+  for (const Case& c : cases) {
+    const std::string said = refusal(c.map);
+    for (const std::string& word : c.words)
+      EXPECT_NE(said.find(word), std::string::npos)
+          << c.what << "\nexpected: " << word << "\nfound:    " << said;
+  }
+}
+
+TEST(ImportTable, WarnsOfWhatIsOnlySuspicious) {
+  const auto with = [](const std::string& column, std::function<double(double)> f,
+                       const std::string& map) {
+    Columns all = columns();
+    all[column] = std::move(f);
+    MeasuredTable table = table_of(all);
+    for (MeasuredColumn& c : table.columns)
+      if (c.name == column)
+        for (std::size_t k = 0; k < kRows; ++k) c.value[k] = all[column](1e-3 * double(k));
+    return imported(map, table);
+  };
+  const Record constant = with(
+      "force", [](double) { return 3.0; }, sound_map());
+  EXPECT_TRUE(warned(constant, "\"force\" (force X) is constant")) << all_warnings(constant);
+  const Record coarse = with(
+      "pos", [](double t) { return 1e-3 * std::round(1e3 * LinearAxis::position(t - 0.004)); },
+      sound_map());
+  EXPECT_TRUE(warned(coarse, "comes in 160 coarse steps of 0.001")) << all_warnings(coarse);
+  EXPECT_NEAR(coarse.find(SignalKind::position, 0)->resolution, 1e-3, 1e-9);
+  const Record clipped = with(
+      "force", [](double t) { return std::clamp(LinearAxis::force(t - 0.004), -60.0, 60.0); },
+      sound_map());
+  EXPECT_TRUE(warned(clipped, "may be saturated")) << all_warnings(clipped);
+  const Record scaled = with(
+      "force", [](double t) { return 1000 * LinearAxis::force(t - 0.004); }, sound_map());
+  EXPECT_TRUE(warned(scaled, "times the declared inertia")) << all_warnings(scaled);
+  const Record outside = with(
+      "pos", [](double t) { return 0.1 + LinearAxis::position(t - 0.004); }, sound_map());
+  EXPECT_TRUE(warned(outside, "outside the declared travel")) << all_warnings(outside);
+}
+
+TEST(Resolution, IsTheStepOfQuantisedValuesAndNothingOfSmoothOnes) {
+  std::vector<double> quantised, smooth;
+  for (int k = 0; k < 3000; ++k) {
+    const double v = std::sin(1e-2 * k);
+    quantised.push_back(0.25e-3 * std::round(v / 0.25e-3));
+    smooth.push_back(v);
+  }
+  EXPECT_NEAR(resolution_of(quantised), 0.25e-3, 1e-9);
+  EXPECT_EQ(resolution_of(smooth), 0);
+  EXPECT_EQ(resolution_of(std::vector<double>(100, 1.0)), 0);
+}
+
+class RecordFile : public testing::Test {
+ protected:
+  RecordFile() { fs::create_directories(folder_); }
+  ~RecordFile() override { fs::remove_all(folder_); }
+  const fs::path folder_ = fs::temp_directory_path() / fmt::format("vcnc-record-{}", getpid());
+};
+
+TEST_F(RecordFile, ReadsBackWhatWasWrittenToTheLastBit) {
+  Record record = imported(sound_map());
+  record.machine_toml = to_toml(declared());
+  record.warnings = {"one", "two"};
+  record.signals[1].value[7] = kMissing;
+  const fs::path file = folder_ / "run.h5";
+  write_record(record, file);
+  EXPECT_TRUE(is_record_file(file));
+  const Record back = load_record(file.string());
+  EXPECT_EQ(back.source, record.source);
+  EXPECT_EQ(back.period, record.period);
+  EXPECT_EQ(back.machine_toml, record.machine_toml);
+  EXPECT_EQ(back.warnings, record.warnings);
+  ASSERT_EQ(back.signals.size(), record.signals.size());
+  for (std::size_t i = 0; i < back.signals.size(); ++i) {
+    EXPECT_EQ(back.signals[i].kind, record.signals[i].kind);
+    EXPECT_EQ(back.signals[i].resolution, record.signals[i].resolution);
+    for (std::size_t k = 0; k < record.samples(); ++k) {
+      const double a = back.signals[i].value[k], b = record.signals[i].value[k];
+      EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << i << " " << k;
+    }
+  }
+  ASSERT_EQ(back.stretches.size(), record.stretches.size());
+  EXPECT_EQ(back.stretches.back().end, record.stretches.back().end);
+  EXPECT_EQ(back.stretches.back().label, record.stretches.back().label);
+}
+
+TEST_F(RecordFile, AnyHdf5FileIsATableOfItsDataSets) {
+  const Record record = imported(sound_map());
+  const fs::path file = folder_ / "run.h5";
+  write_record(record, file);
+  const MeasuredTable table = read_measured_table(file.string());
+  ASSERT_EQ(table.columns.size(), record.signals.size());
+  EXPECT_EQ(table.columns[1].name, "signal_1");
+  EXPECT_EQ(table.columns[1].value, record.signals[1].value);
+  const Record again = import_table(
+      table,
+      parse_import_map("[time]\nrate_hz = 1000\n" + signal("signal_1", "position", "X", "m"), "m"),
+      "m", nullptr);
+  EXPECT_EQ(again.signals[0].value, record.signals[1].value);
+}
+
+TEST_F(RecordFile, AChangedOrForeignFileIsRefused) {
+  const fs::path file = folder_ / "run.h5";
+  write_record(imported(sound_map()), file);
+  {
+    std::fstream bytes(file, std::ios::in | std::ios::out | std::ios::binary);
+    bytes.seekp(3000);
+    bytes.put('\x55');
+  }
+  EXPECT_THROW(read_record(file), MeasurementError);
+  EXPECT_THROW(load_record(file.string()), InputError);
+  std::ofstream(folder_ / "run.csv") << "t,q\n0,1\n";
+  try {
+    load_record((folder_ / "run.csv").string());
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("a table needs --map"), std::string::npos) << e.what();
+  }
+}
+
+}  // namespace
+}  // namespace vcnc

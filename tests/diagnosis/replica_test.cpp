@@ -1,0 +1,205 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <future>
+
+#include "diagnosis/commanded_motion.hpp"
+#include "tests/diagnosis/recorded_run.hpp"
+
+namespace vcnc {
+namespace {
+
+using Prediction = std::vector<std::vector<double>>;
+
+bool same_bits(const Prediction& a, const Prediction& b) {
+  if (a.size() != b.size()) return false;
+  for (std::size_t c = 0; c < a.size(); ++c)
+    if (a[c].size() != b[c].size() ||
+        std::memcmp(a[c].data(), b[c].data(), a[c].size() * sizeof(double)) != 0)
+      return false;
+  return true;
+}
+
+const RecordedRun& reversals() {
+  static const RecordedRun run = [] {
+    Effects effects;
+    effects.axis[kX].get<Coulomb>() = Coulomb::nominal(false);
+    return recorded_run(Showing::reversals, kX, effects);
+  }();
+  return run;
+}
+
+/// Hypotheses of all parts of the machine.
+std::vector<Machine> hypotheses(const Machine& declared) {
+  std::vector<Machine> all;
+  const auto add = [&](auto&& change) {
+    Machine machine = declared;
+    change(machine);
+    all.push_back(machine);
+  };
+  add([](Machine& m) { m.effects.axis[kX].get<Coulomb>() = Coulomb::nominal(false); });
+  add([](Machine& m) { m.effects.axis[kX].get<ScaleError>() = ScaleError::nominal(); });
+  add([](Machine& m) { m.effects.get<Squareness>() = Squareness::nominal(); });
+  add([](Machine& m) { m.effects.get<ProbeGain>() = ProbeGain::nominal(); });
+  add([](Machine& m) { m.effects.deviations.push_back({"axes.X.load_kg", 550}); });
+  add([](Machine& m) { m.effects.axis[kY].get<Viscous>() = Viscous::nominal(false); });
+  add([](Machine&) {});
+  return all;
+}
+
+TEST(MachineReplica, MemoryChangesNothing) {
+  const RecordedRun& run = reversals();
+  const MachineReplica replica = run.replica();
+  const std::vector<Machine> all = hypotheses(run.declared);
+  for (int round = 0; round < 2; ++round)
+    for (const Machine& machine : all)
+      EXPECT_TRUE(same_bits(replica.predict(machine), run.replica().predict(machine)));
+}
+
+TEST(MachineReplica, ThreadsChangeNothing) {
+  const RecordedRun& run = reversals();
+  const MachineReplica replica = run.replica();
+  const std::vector<Machine> all = hypotheses(run.declared);
+  std::vector<std::future<Prediction>> answers;
+  for (const Machine& machine : all)
+    answers.push_back(std::async(std::launch::async, [&] { return replica.predict(machine); }));
+  for (std::size_t i = 0; i < all.size(); ++i)
+    EXPECT_TRUE(same_bits(answers[i].get(), run.replica().predict(all[i]))) << i;
+}
+
+TEST(MachineReplica, IsFullAtItsAnchor) {
+  const RecordedRun& run = reversals();
+  MachineReplica replica = run.replica();
+  EXPECT_TRUE(same_bits(replica.predict(run.declared), replica.predict_in_full(run.declared)));
+  EXPECT_FALSE(
+      same_bits(replica.predict(run.true_machine), replica.predict_in_full(run.true_machine)));
+  replica.anchor(run.true_machine);
+  EXPECT_TRUE(
+      same_bits(replica.predict(run.true_machine), replica.predict_in_full(run.true_machine)));
+}
+
+TEST(MachineReplica, ChanceIsNotPredicted) {
+  const RecordedRun& run = reversals();
+  const MachineReplica replica = run.replica();
+  Machine noisy = run.declared;
+  noisy.effects.get<AdcNoise>() = AdcNoise::nominal();
+  noisy.effects.axis[kX].get<BusJitter>() = BusJitter::nominal(false);
+  EXPECT_TRUE(same_bits(replica.predict(noisy), replica.predict(run.declared)));
+}
+
+/// The controllers keep what is declared, the bodies are as given.
+TEST(MachineReplica, AnotherDeclaredNumberIsADeviation) {
+  const RecordedRun& run = reversals();
+  const MachineReplica replica = run.replica();
+  Machine deviating = run.declared, other = run.declared;
+  deviating.effects.deviations.push_back({"axes.X.load_kg", 550});
+  other.axes[kX].mechanics.load = 550;
+  EXPECT_TRUE(same_bits(replica.predict(deviating), replica.predict(other)));
+  EXPECT_FALSE(same_bits(replica.predict(deviating), replica.predict(run.declared)));
+}
+
+TEST(MachineReplica, OneAxisAloneIsPredictedAsInTheWhole) {
+  const RecordedRun& run = reversals();
+  Record alone = run.record;
+  std::erase_if(alone.signals, [](const MeasuredSignal& s) {
+    return s.axis != kX || (s.kind != SignalKind::command && s.kind != SignalKind::position);
+  });
+  const MachineReplica whole = run.replica(), one(alone, run.declared, std::nullopt);
+  ASSERT_EQ(one.channels().size(), 1u);
+  const Prediction expected = whole.predict(run.true_machine),
+                   found = one.predict(run.true_machine);
+  for (std::size_t c = 0; c < expected.size(); ++c)
+    if (whole.channels()[c].kind == SignalKind::position && whole.channels()[c].axis == kX) {
+      EXPECT_EQ(found[0], expected[c]);
+    }
+}
+
+TEST(MachineReplica, AnAxisWithoutCommandIsWhereItWasMeasured) {
+  const RecordedRun& run = reversals();
+  Record record = run.record;
+  std::erase_if(record.signals, [](const MeasuredSignal& s) {
+    return s.kind == SignalKind::command && s.axis == kX;
+  });
+  const MachineReplica replica(record, run.declared, run.piece);
+  for (const ComparedChannel& c : replica.channels())
+    EXPECT_TRUE(c.kind == SignalKind::deflection || c.axis != kX);
+  const Prediction found = replica.predict_in_full(run.declared);
+  EXPECT_LT(misfit(run, replica, found, SignalKind::deflection).rms, 20e-9);
+}
+
+TEST(MachineReplica, AGapStaysAGapUntilTheDriveHasForgotten) {
+  const RecordedRun& run = reversals();
+  Record record = run.record;
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::command && s.axis == kX)
+      for (std::size_t k = 500; k < 510; ++k) s.value[k] = kMissing;
+  const MachineReplica replica(record, run.declared, run.piece);
+  const Prediction found = replica.predict(run.declared);
+  for (const std::vector<double>& channel : found) {
+    EXPECT_FALSE(std::isnan(channel[499]));
+    EXPECT_TRUE(std::isnan(channel[500]) && std::isnan(channel[559]));
+    EXPECT_FALSE(std::isnan(channel[560]));
+  }
+}
+
+/// A slow sine, sampled at 2 ms and at 1 ms: the drive is the same.
+TEST(MachineReplica, ARecordAtAnotherRateIsTheSameMotion) {
+  const auto sampled = [](double period) {
+    Record record;
+    record.period = period;
+    const auto n = static_cast<std::size_t>(std::lround(2 / period));
+    MeasuredSignal command{SignalKind::command, kX, "x", {}, 0},
+        position{SignalKind::position, kX, "y", {}, 0};
+    for (std::size_t i = 0; i < n; ++i) {
+      const double t = static_cast<double>(i) * period;
+      command.value.push_back(5e-3 * (1 - std::cos(2 * kPi * t)));
+      position.value.push_back(0);
+    }
+    record.signals = {command, position};
+    return record;
+  };
+  Machine machine = ideal_machine();
+  machine.effects.axis[kX].get<VelocityFfError>() = {-0.05};
+  const MachineReplica fast(sampled(1e-3), machine, std::nullopt),
+      slow(sampled(2e-3), machine, std::nullopt);
+  const Prediction a = fast.predict(machine), b = slow.predict(machine);
+  double largest = 0;
+  for (std::size_t i = 100; i + 1 < b[0].size(); ++i)
+    largest = std::max(largest, std::abs(b[0][i] - a[0][2 * i]));
+  EXPECT_LT(largest, 2e-9);
+  EXPECT_GT(std::abs(a[0][250] - 5e-3), 1e-6);  // it lags
+}
+
+TEST(MachineReplica, ABeginInMotionIsNotPredicted) {
+  Record record;
+  MeasuredSignal command{SignalKind::command, kX, "x", {}, 0},
+      position{SignalKind::position, kX, "y", {}, 0};
+  for (int i = 0; i < 1000; ++i) command.value.push_back(2e-5 * i);
+  position.value = command.value;
+  record.signals = {command, position};
+  const Machine machine = ideal_machine();
+  const Prediction found = MachineReplica(record, machine, std::nullopt).predict(machine);
+  EXPECT_TRUE(std::isnan(found[0][0]) && std::isnan(found[0][299]));
+  EXPECT_NEAR(found[0][990], command.value[990], 1e-6);
+}
+
+TEST(SplineDerivative, IsExactForAParabolaInsideAndFourthOrderForASine) {
+  std::vector<double> parabola, sine;
+  for (int i = 0; i < 200; ++i) {
+    parabola.push_back(3 + 2 * i * 0.01 + 5 * i * i * 1e-4);
+    sine.push_back(std::sin(i * 0.1));
+  }
+  const std::vector<double> d = spline_derivative(parabola, 0.01);
+  for (int i = 30; i < 170; ++i)
+    EXPECT_NEAR(d[static_cast<std::size_t>(i)], 2 + 10 * i * 0.01, 1e-12);
+  const std::vector<double> c = spline_derivative(sine, 0.1);
+  double largest = 0;
+  for (int i = 30; i < 170; ++i)
+    largest = std::max(largest, std::abs(c[static_cast<std::size_t>(i)] - std::cos(i * 0.1)));
+  EXPECT_LT(largest, 1.1 * std::pow(0.1, 4) / 180);  // h^4/180 f^(5)
+  EXPECT_GT(largest, 0.9 * std::pow(0.1, 4) / 180);
+}
+
+}  // namespace
+}  // namespace vcnc

@@ -1,0 +1,91 @@
+#include "diagnosis/selection.hpp"
+
+#include <gtest/gtest.h>
+
+#include "toy_machine.hpp"
+
+namespace vcnc {
+namespace {
+
+std::string names(const SelectionResult& result, const std::vector<Candidate>& candidates) {
+  std::string all;
+  const auto add = [&](const std::string& name) {
+    if (!all.empty()) all.push_back(' ');
+    all += name;
+  };
+  for (const AddedEffect& a : result.found.added) add(candidates[a.candidate].name());
+  for (const std::string& key : result.found.released) add(key);
+  return all;
+}
+
+SelectionResult search(const Record& record, const Machine& declared) {
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, declared);
+  return select_effects_of(evidence, declared, toy::candidates(), {}, {});
+}
+
+struct Injected {
+  const char* key;
+  double value;
+  const char* found;
+};
+
+TEST(Selection, NamesEveryEffectOfTheToyMachine) {
+  for (const Injected& i :
+       {Injected{"effects.X.command_delay.delay_ms", 0.01, "X.command_delay"},
+        Injected{"effects.X.coulomb.level_N", 5, "X.coulomb"},
+        Injected{"effects.X.viscous.coefficient_Ns_per_m", 60, "X.viscous"},
+        Injected{"effects.X.scale_error.error_ppm", -8, "X.scale_error"},
+        Injected{"effects.X.load_play.width_um", 0.4, "X.load_play"},
+        Injected{"effects.geometry.squareness.xy_urad", 6, "geometry.squareness"},
+        Injected{"axes.X.load_kg", 545, "axes.X.load_kg"}}) {
+    Record record = toy::commands(1000, 4);
+    Machine truth;
+    move_number(truth, i.key, i.value);
+    toy::measure(record, truth, 7);
+    const SelectionResult result = search(record, Machine());
+    EXPECT_EQ(names(result, toy::candidates()), i.found) << i.key;
+    EXPECT_NEAR(number_of(result.found.machine, i.key), i.value, 0.1 * std::abs(i.value)) << i.key;
+  }
+}
+
+TEST(Selection, FindsPeriodAndPhaseOfAWave) {
+  Record record = toy::commands(1000, 4);
+  Machine truth;
+  move_number(truth, "effects.X.pitch_periodic.amplitude_um", 0.5);
+  move_number(truth, "effects.X.pitch_periodic.period_mm", 7.3);
+  move_number(truth, "effects.X.pitch_periodic.phase_deg", 130);
+  toy::measure(record, truth, 3);
+  const SelectionResult result = search(record, Machine());
+  ASSERT_EQ(names(result, toy::candidates()), "X.pitch_periodic");
+  const Machine& found = result.found.machine;
+  EXPECT_NEAR(number_of(found, "effects.X.pitch_periodic.amplitude_um"), 0.5, 0.02);
+  EXPECT_NEAR(number_of(found, "effects.X.pitch_periodic.period_mm"), 7.3, 0.02);
+  EXPECT_NEAR(number_of(found, "effects.X.pitch_periodic.phase_deg"), 130, 5);
+}
+
+TEST(Selection, AccusesNoCleanMachine) {
+  for (std::uint64_t seed = 100; seed < 112; ++seed) {
+    Record record = toy::commands(500, 4);
+    Machine truth;
+    // Within tolerance, and clamped a little off.
+    move_number(truth, "axes.X.load_kg", 500 * (1 + 0.01 * gaussian_noise(seed, 9, 0)[0]));
+    move_number(truth, "effects.setup.piece_offset.shift_um.x", 3 * gaussian_noise(seed, 9, 1)[0]);
+    toy::measure(record, truth, seed);
+    EXPECT_EQ(names(search(record, Machine()), toy::candidates()), "") << seed;
+  }
+}
+
+TEST(Selection, FindsThreeEffectsTogether) {
+  Record record = toy::commands(1000, 4);
+  Machine truth;
+  move_number(truth, "effects.X.command_delay.delay_ms", 0.02);
+  move_number(truth, "effects.X.load_play.width_um", 1);
+  move_number(truth, "effects.geometry.squareness.xy_urad", 20);
+  toy::measure(record, truth, 11);
+  const SelectionResult result = search(record, Machine());
+  EXPECT_EQ(result.found.added.size(), 3U) << names(result, toy::candidates());
+}
+
+}  // namespace
+}  // namespace vcnc

@@ -1,0 +1,114 @@
+// `vcnc import` and `vcnc diagnose` as their users start them.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/processes/shell.hpp"
+
+namespace vcnc {
+namespace {
+
+constexpr double kPi2 = 2 * std::numbers::pi;
+
+class DiagnoseCli : public testing::Test {
+ protected:
+  DiagnoseCli() {
+    write_text(scratch_ / "machine.toml", "name = \"bench\"\n");
+    write_text(scratch_ / "map.toml",
+               "machine = \"machine.toml\"\n[time]\ncolumn = \"t\"\nunit = \"ms\"\n"
+               "[[signals]]\ncolumn = \"A\"\nkind = \"cosine\"\naxis = \"x\"\nunit = \"V\"\n"
+               "[[signals]]\ncolumn = \"B\"\nkind = \"sine\"\naxis = \"x\"\nunit = \"V\"\n");
+    write_text(scratch_ / "good.csv", encoder(0));
+    write_text(scratch_ / "bad.csv", encoder(0.05));
+  }
+
+  /// An encoder whose sine is larger than its cosine by a share of `gain`.
+  static std::string encoder(double gain) {
+    std::string text = "t,A,B\n";
+    for (int k = 0; k < 5000; ++k) {
+      const double phi = 10 * kPi2 * std::sin(kPi2 * k / 5000);
+      const double noise = 1e-3 * std::sin(12.9898 * k * k);
+      text += fmt::format("{},{:.6f},{:.6f}\n", k, 0.5 * std::cos(phi) + noise,
+                          0.5 * (1 + gain) * std::sin(phi) - noise);
+    }
+    return text;
+  }
+  Said vcnc(const std::string& arguments) { return shell(scratch_, bin("vcnc") + " " + arguments); }
+  void expect_refused(const std::string& arguments, const std::string& sentence) {
+    const Said said = vcnc(arguments);
+    EXPECT_EQ(said.code, 2) << arguments;
+    EXPECT_NE(said.err.find(sentence), std::string::npos) << arguments << "\n" << said.err;
+    EXPECT_EQ(said.err.find('\n'), said.err.size() - 1) << "one line: " << said.err;
+  }
+
+  Scratch scratch_;
+};
+
+TEST_F(DiagnoseCli, ATableIsImportedAndDiagnosedWithPageModelAndJson) {
+  const std::string record = scratch_ / "bad.h5", out = scratch_ / "why";
+  const Said imported = vcnc("import " + (scratch_ / "bad.csv") + " --map " +
+                             (scratch_ / "map.toml") + " --out " + record);
+  ASSERT_EQ(imported.code, 0) << imported.err;
+  EXPECT_NE(imported.out.find("5000 samples"), std::string::npos) << imported.out;
+  EXPECT_NE(imported.out.find("cosine x"), std::string::npos) << imported.out;
+  for (int i = 0; i < 2; ++i) {  // the second replaces the first
+    const Said said = vcnc("diagnose " + record + " --out " + out);
+    ASSERT_EQ(said.code, 0) << said.err;
+    EXPECT_EQ(said.out.find("EXPLAINED: "), 0u) << said.out;
+    EXPECT_NE(said.out.find("probe.signal_gain (of the measurement): gain_percent.x = "),
+              std::string::npos)
+        << said.out;
+  }
+  const std::string json = read_text(out + "/diagnosis.json");
+  EXPECT_EQ(json_value(json, "verdict"), "EXPLAINED");
+  EXPECT_EQ(json_value(json, "name"), "signal_gain");
+  const std::string page = read_text(out + "/report.html");
+  EXPECT_NE(page.find("signal_gain"), std::string::npos);
+  EXPECT_NE(page.find("<svg"), std::string::npos);
+  EXPECT_NE(read_text(out + "/found.toml").find("[effects.probe.signal_gain]"), std::string::npos);
+  // What was found is a machine that vcnc reads.
+  EXPECT_EQ(vcnc("check " + (scratch_ / "none.ngc") + " --machine " + out + "/found.toml").code, 2);
+  write_text(scratch_ / "none.ngc", "G90 G21\nM30\n");
+  const Said checked =
+      vcnc("check " + (scratch_ / "none.ngc") + " --machine " + out + "/found.toml");
+  EXPECT_EQ(checked.code, 0) << checked.err;
+}
+
+TEST_F(DiagnoseCli, TheTableItselfWithItsMapGivesTheSameVerdict) {
+  const Said said =
+      vcnc("diagnose " + (scratch_ / "good.csv") + " --map " + (scratch_ / "map.toml"));
+  ASSERT_EQ(said.code, 0) << said.err;
+  EXPECT_EQ(said.out.find("NO DEVIATION: "), 0u) << said.out;
+}
+
+TEST_F(DiagnoseCli, RefusesWhatItCannotUseAndLeavesNothingBehind) {
+  const std::string table = scratch_ / "bad.csv", map = scratch_ / "map.toml";
+  expect_refused("diagnose " + table, "a table needs --map");
+  expect_refused("diagnose " + (scratch_ / "none.h5"), "no such file or folder");
+  expect_refused("import " + table + " --map " + map, "--out: is missing");
+  expect_refused("import " + table + " --map " + map + " --out " + map,
+                 "exists and is no record of vcnc import");
+  write_text(scratch_ / "wrong.toml",
+             "[time]\ncolumn = \"t\"\nunit = \"ms\"\n[[signals]]\ncolumn = \"A\"\nkind = "
+             "\"cosine\"\naxis = \"x\"\nunit = \"mm\"\n");
+  expect_refused(
+      "import " + table + " --map " + (scratch_ / "wrong.toml") + " --out " + (scratch_ / "new.h5"),
+      "wrong.toml:8: signals.unit: \"mm\" does not fit");
+  EXPECT_FALSE(fs::exists(scratch_ / "new.h5"));
+  fs::create_directory(scratch_ / "mine");
+  write_text(scratch_ / "mine/thesis.txt", "do not lose");
+  expect_refused("diagnose " + table + " --map " + map + " --out " + (scratch_ / "mine"),
+                 "holds other files");
+  EXPECT_EQ(read_text(scratch_ / "mine/thesis.txt"), "do not lose");
+}
+
+TEST_F(DiagnoseCli, TheMapHasItsReference) {
+  const Said said = vcnc("import --keys");
+  EXPECT_EQ(said.code, 0);
+  EXPECT_NE(said.out.find("`signals.unit`"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vcnc
