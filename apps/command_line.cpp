@@ -248,8 +248,7 @@ void add_import(CLI::App& app) {
   command->add_option("--map", o->map, "what its columns are (TOML)");
   command->add_option("--out", o->out, "record to write");
   command->add_flag("--keys", o->keys, "show the keys of a map, as Markdown");
-  command->callback([o] { import_command(*o);
-});
+  command->callback([o] { import_command(*o); });
 }  // namespace
 
 void add_diagnose(CLI::App& app, int& code) {
@@ -401,7 +400,7 @@ void refuse_empty_values(CLI::App& app) {
   for (CLI::App* sub : app.get_subcommands({})) refuse_empty_values(*sub);
 }
 
-}  // namespace vcnc
+}  // namespace
 
 int command_line(int argc, char** argv) {
   CLI::App app{"vcnc: a virtual five-axis CNC machine that behaves like a measured one"};

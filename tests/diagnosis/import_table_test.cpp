@@ -132,9 +132,9 @@ TEST(ImportTable, UnitScaleSignAndOffsetComeOutInSi) {
   all["force"] = [](double t) { return LinearAxis::force(t - 0.004) / 35.15; };
   const Record record =
       imported(kTime + signal("cmd", "command", "X", "m") +
-                 signal("pos", "position", "X", "um", "sign = -1\noffset = 1000") +
-                 signal("force", "force", "X", "N", "scale = 35.15"),
-             table_of(all));
+                   signal("pos", "position", "X", "um", "sign = -1\noffset = 1000") +
+                   signal("force", "force", "X", "N", "scale = 35.15"),
+               table_of(all));
   EXPECT_NEAR(record.find(SignalKind::position, 0)->value[500], LinearAxis::position(0.496), 1e-6);
   EXPECT_NEAR(record.find(SignalKind::force, 0)->value[500], LinearAxis::force(0.496), 1e-3);
 }
@@ -144,9 +144,9 @@ TEST(ImportTable, TwoEncodersOfARobotJointBecomePositionAndTwist) {
   all["motor"] = [](double t) { return 5 * LinearAxis::position(t); };
   all["load"] = [](double t) { return 5 * LinearAxis::position(t) - 1e-3 * std::sin(t); };
   const Record record = imported(kTime + "[[axes]]\nname = \"joint 2\"\nplace = \"C\"\n" +
-                                   signal("motor", "motor_position", "joint 2", "rad") +
-                                   signal("load", "load_position", "joint 2", "rad"),
-                               table_of(all));
+                                     signal("motor", "motor_position", "joint 2", "rad") +
+                                     signal("load", "load_position", "joint 2", "rad"),
+                                 table_of(all));
   ASSERT_EQ(record.signals.size(), 2u);
   const MeasuredSignal* twist = record.find(SignalKind::twist, kC);
   ASSERT_NE(twist, nullptr);
@@ -173,9 +173,9 @@ TEST(ImportTable, GapsAndMissingValuesStayMissingAndAreTold) {
 
 TEST(ImportTable, LapsByTimeAndByColumn) {
   const Record by_time = imported(sound_map() +
-                                "[[laps]]\nfrom_s = 0\nto_s = 2\ncondition = \"swing\"\n"
-                                "[[laps]]\nfrom_s = 2\nto_s = 4\ncondition = \"swing\"\n"
-                                "[[laps]]\nfrom_s = 4\nto_s = 5\ncondition = \"rest\"\n");
+                                  "[[laps]]\nfrom_s = 0\nto_s = 2\ncondition = \"swing\"\n"
+                                  "[[laps]]\nfrom_s = 2\nto_s = 4\ncondition = \"swing\"\n"
+                                  "[[laps]]\nfrom_s = 4\nto_s = 5\ncondition = \"rest\"\n");
   ASSERT_EQ(by_time.stretches.size(), 3u);
   EXPECT_EQ(by_time.stretches[1].begin, 2000u);
   EXPECT_EQ(by_time.stretches[1].end, 4000u);
