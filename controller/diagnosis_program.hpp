@@ -11,7 +11,7 @@
 //
 // Lap times are (n + 0.382) / 50 s: what swings with the mains falls on another place of every lap
 // (the golden section is as far from repeating as can be). Without a piece the rings are free and
-// there are no spins. About 100 s in a ring of 55 mm with 2 laps at 2200 mm/min.
+// there are no spins. 130 s in a ring of 55 mm with 2 laps at 2200 mm/min.
 // Source: ISO 230-4 (circular tests), ISO 230-6 and ISO 10791-6 (lines, spins with RTCP).
 #pragma once
 

@@ -32,7 +32,7 @@ struct FoundEffect {
   std::string place;  ///< "X", "geometry", ...; of a declared number its key
   std::vector<FittedNumber> numbers;
   double gain = 0;              ///< held-out chi-square it explains
-  double contour_error_um = 0;  ///< what it does to the contour error: RMS with less RMS without
+  double contour_error_um = 0;  ///< RMS by which it moves the ball, else the axes
   bool minor = false;           ///< significant, but of no consequence for the contour
   bool acquisition = false;     ///< of the measurement, not of the machine
   /// Others that the data cannot tell from it, and the canned program that would.

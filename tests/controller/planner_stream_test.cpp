@@ -7,22 +7,13 @@
 #include "bus/tick.hpp"
 #include "controller/limit_use.hpp"
 #include "controller/planner.hpp"
+#include "planned_moves.hpp"
 
 namespace vcnc {
 namespace {
 
 using Dynamics = NcParams::Dynamics;
 constexpr double kAngleTolerance = 0.01 * kDegree;
-
-Machine test_machine() {
-  Machine machine;
-  machine.probe.in_spindle = false;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    AxisLimits& limits = machine.axes[i].limits;
-    limits = is_rotary(i) ? AxisLimits{-10, 10, 0, 3.5, 35, 350} : AxisLimits{-1, 1, 0, 0.5, 5, 50};
-  }
-  return machine;
-}
 
 /// Rows over a waved surface with corners at their ends, a shorter and a longer move now and then.
 std::vector<Move> surface(int count, Dynamics dynamics) {

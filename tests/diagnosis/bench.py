@@ -386,6 +386,8 @@ def check_bounds(name, part, rows):
     bounds = tomllib.loads((HERE / "bounds.toml").read_text()).get(name, {}).get(part, {})
     measured = grading.summary([r for r in rows if "failed" not in r])
     out = [f"{part}: {r['number']} failed: {r['failed'][-200:]}" for r in rows if "failed" in r]
+    if not bounds:
+        return out + [f"{part}: bounds.toml has no [{name}.{part}]"]
     for measure, bound in bounds.items():
         value = grading.number_of(measured[measure])
         if value is None or value < bound.get("least", 0) or value > bound.get("most", 1):
