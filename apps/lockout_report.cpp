@@ -172,9 +172,9 @@ std::string process_table(const LockoutResults& r) {
       "\nreal processes       runs  not safe  after the end  exit 0  exit 1  exit 3  longest\n";
   for (const auto* rows : {&by_kind, &by_node, &by_phase}) {
     for (const auto& [name, row] : *rows) {
-      const auto codes = [&](int code) {
-        const auto found = row.codes.find(code);
-        return found == row.codes.end() ? std::size_t{0} : found->second;
+      const auto codes = [&codes_of = row.codes](int code) {
+        const auto found = codes_of.find(code);
+        return found == codes_of.end() ? std::size_t{0} : found->second;
       };
       text +=
           fmt::format("  {:18} {:>4}  {:>8}  {:>13}  {:>6}  {:>6}  {:>6}  {:>5.1f} s\n", name,

@@ -99,9 +99,9 @@ LockoutFolder::~LockoutFolder() {
 std::vector<LockoutVerdict> LockoutRunner::run(const std::vector<LockoutItem>& items) const {
   const LockoutFolder folder;
   const std::size_t threads = std::max<std::size_t>(
-      1, std::min(items.size(),
-                  static_cast<std::size_t>(
-                      jobs > 0 ? jobs : std::max(1u, std::thread::hardware_concurrency()))));
+      1, std::min(items.size(), static_cast<std::size_t>(
+                                    jobs > 0 ? static_cast<unsigned>(jobs)
+                                             : std::max(1u, std::thread::hardware_concurrency()))));
   std::vector<LockoutVerdict> verdicts(items.size());
   std::vector<char> done(items.size(), 0);
   std::atomic<std::size_t> next{0};

@@ -79,7 +79,8 @@ constexpr std::array<std::uint8_t, 2048> make_arbitration_table() {
 constexpr auto kArbitration = make_arbitration_table();
 
 FrameBits classical(const Frame& frame) {
-  const unsigned header = frame.id << 7 | dlc(frame.len);  // identifier, RTR, IDE, r0, DLC: 18 bits
+  // identifier, RTR, IDE, r0, DLC: 18 bits
+  const unsigned header = unsigned{frame.id} << 7 | dlc(frame.len);
   Step step = push_bits(kOneDominant, header, 18);
   int stuffed = step.stuffed;
   unsigned crc = 0;  // the leading zeros that fill up the 19 header bits do not change it

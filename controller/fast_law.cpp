@@ -444,8 +444,8 @@ FastLaw::Warp FastLaw::warp_nearest(const std::vector<Excess>& excess, int firmn
     std::vector<std::array<double, 3>> found(nodes.size(), {1, 1, 1});
     for (const Excess& e : excess) {
       if (e.t1 < from || e.t0 > to) continue;
-      const auto place = [&](double t) {
-        return std::clamp((t - from) / h, 0.0, static_cast<double>(count));
+      const auto place = [&, start = from](double t) {
+        return std::clamp((t - start) / h, 0.0, static_cast<double>(count));
       };
       const auto until = static_cast<std::size_t>(std::ceil(place(e.t1)));
       for (auto i = static_cast<std::size_t>(std::floor(place(e.t0))); i <= until; ++i) {

@@ -39,8 +39,8 @@ TEST(Pacer, LateCyclesAreCountedAndCaughtUp) {
 
 TEST(Pacer, SpeedIsChecked) {
   EXPECT_THROW(Pacer(-1), std::invalid_argument);
-  EXPECT_THROW(Pacer(std::numeric_limits<double>::infinity()), std::invalid_argument);
-  EXPECT_THROW(Pacer(std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
+  EXPECT_THROW(Pacer{std::numeric_limits<double>::infinity()}, std::invalid_argument);
+  EXPECT_THROW(Pacer{std::numeric_limits<double>::quiet_NaN()}, std::invalid_argument);
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ TEST(TimeWarp, TheNearestMotionIsLeftAloneWhereItIsWithinLimits) {
   EXPECT_NEAR(nodes[200].use(), 1.2, 1e-12);
   const auto c = time_warp(nodes, WarpAim::nearest, 1e-6, true, true);
   EXPECT_LE(use_of(nodes[200], &c[200]).j, 1.001);
-  for (const std::size_t far : {50, 120, 280, 350}) EXPECT_NEAR(c[far], 1, 1e-3);
+  for (const std::size_t far : {50u, 120u, 280u, 350u}) EXPECT_NEAR(c[far], 1, 1e-3);
 }
 
 TEST(TimeWarp, UseIsTheLargestShare) {

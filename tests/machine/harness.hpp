@@ -55,7 +55,7 @@ inline std::unique_ptr<PieceParams> piece_params(const Machine& machine) {
 }
 
 /// Builds with a sanitizer are ten times slower and take fewer cases.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef VCNC_SANITIZED
 inline constexpr bool kSanitized = true;
 #else
 inline constexpr bool kSanitized = false;
