@@ -17,8 +17,7 @@ constexpr std::uint64_t kSeed = 1;  // of noise that a replica does not have
 /// An axis of which no command is known: it is where it was measured.
 AxisReplay as_measured(const std::vector<double>& position, std::size_t cycles, double start) {
   AxisReplay replay;
-  replay.measured.assign(cycles, kMissing);
-  replay.twist = replay.force = replay.measured;
+  replay.measured = replay.twist = replay.force = std::vector<double>(cycles, kMissing);
   replay.truth.resize(cycles * kTruthPerCycle, start);
   if (position.empty()) return replay;
   for (std::size_t k = 0; k < cycles; ++k) {
@@ -38,9 +37,7 @@ AxisReplay replay_axis(const Machine& hypothesis, const Machine& actual, std::si
   if (motion.told[axis] != CommandedMotion::Told::command)
     return as_measured(motion.position[axis], cycles, actual.axes[axis].limits.start);
   AxisReplay replay;
-  replay.measured.resize(cycles);
-  replay.twist.resize(cycles);
-  replay.force.resize(cycles);
+  std::vector<double> measured(cycles), twist(cycles), force(cycles);
   replay.truth.resize(cycles * kTruthPerCycle, start_position(actual, kSeed)[axis]);
   AxisDrive drive(hypothesis, axis, kSeed);
   const double full_force = hypothesis.axes[axis].mechanics.force_limit;
@@ -49,7 +46,7 @@ AxisReplay replay_axis(const Machine& hypothesis, const Machine& actual, std::si
     for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = actual.axes[i].limits.start;
     return q;
   }());
-  replay.measured[0] = start[axis];
+  measured[0] = start[axis];
   for (std::size_t k = 1; k < cycles; ++k) {
     AxisVector position = start, velocity{};
     for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -59,12 +56,15 @@ AxisReplay replay_axis(const Machine& hypothesis, const Machine& actual, std::si
     }
     drive.tell_commands(position, velocity);
     const AxisCycle cycle = drive.follow({position[axis], velocity[axis]});
-    replay.measured[k] = cycle.measured;
-    replay.twist[k] = cycle.second;
-    replay.force[k] = cycle.force * full_force;
+    measured[k] = cycle.measured;
+    twist[k] = cycle.second;
+    force[k] = cycle.force * full_force;
     std::copy(cycle.truth.begin(), cycle.truth.end(),
               replay.truth.begin() + static_cast<std::ptrdiff_t>(k * kTruthPerCycle));
   }
+  replay.measured = std::move(measured);
+  replay.twist = std::move(twist);
+  replay.force = std::move(force);
   return replay;
 }
 

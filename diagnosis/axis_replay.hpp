@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "diagnosis/commanded_motion.hpp"
+#include "diagnosis/replica.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {
@@ -14,7 +15,7 @@ inline constexpr std::size_t kTruthPerCycle = 10;
 
 /// One value per cycle of 1 ms, SI; NaN where nothing is said of this axis.
 struct AxisReplay {
-  std::vector<double> measured, twist, force;
+  SharedSeries measured, twist, force;
   std::vector<double> truth;  ///< kTruthPerCycle per cycle: [10 k + 9] belongs to the instant k ms
 };
 

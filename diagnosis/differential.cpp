@@ -14,7 +14,7 @@ constexpr std::size_t kSlack = 3;
 DifferentialRecord less_healthy(const Record& now, const Record& healthy, const Replica& of_healthy,
                                 const Machine& declared) {
   DifferentialRecord result{now, 1};
-  const std::vector<std::vector<double>> predicted = of_healthy.predict(declared);
+  const Prediction predicted = of_healthy.predict(declared);
   const std::vector<ComparedChannel>& channels = of_healthy.channels();
   std::size_t fewest = 0, unmatched = 0;
   for (MeasuredSignal& signal : result.record.signals) {

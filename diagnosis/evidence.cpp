@@ -12,7 +12,25 @@ namespace {
 /// An axis stands when its command moved less than this in each of the last and next 25 ms.
 constexpr double kStandingLinear = 0.2e-3, kStandingRotary = 0.2e-3;  // [m/s], [rad/s]
 
+/// sum of a b, in doubles and several at a time.
+double dot(const float* a, const float* b, std::size_t n) {
+  constexpr std::size_t kLanes = 8;
+  double sum[kLanes] = {};
+  std::size_t k = 0;
+  for (; k + kLanes <= n; k += kLanes)
+    for (std::size_t j = 0; j < kLanes; ++j)
+      sum[j] += static_cast<double>(a[k + j]) * static_cast<double>(b[k + j]);
+  for (; k < n; ++k) sum[0] += static_cast<double>(a[k]) * static_cast<double>(b[k]);
+  return ((sum[0] + sum[4]) + (sum[1] + sum[5])) + ((sum[2] + sum[6]) + (sum[3] + sum[7]));
+}
+
 }  // namespace
+
+bool Column::zero() const {
+  for (std::size_t c = 0; c < size(); ++c)
+    if (!(*channels_)[c].empty()) return false;
+  return true;
+}
 
 Evidence::Evidence(const Record& record, Replica& replica, const Machine& declared,
                    double noise_scale)
@@ -29,7 +47,7 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
   }
   mask_standing();
 
-  Prediction difference = measured_;
+  SeriesOfChannels difference = measured_;
   for (std::size_t c = 0; c < channels.size(); ++c)
     for (std::size_t k = 0; k < difference[c].size(); ++k)
       difference[c][k] = raw_valid_[c][k] ? measured_[c][k] - declared_[c][k] : kMissing;
@@ -86,7 +104,7 @@ std::vector<float> Evidence::whiten(std::size_t channel, const std::vector<doubl
 }
 
 Column Evidence::residual(const Prediction& prediction) const {
-  Column column(prediction.size());
+  Column::Channels column(prediction.size());
   for (std::size_t c = 0; c < prediction.size(); ++c) {
     std::vector<double> r(prediction[c].size(), 0.0);
     for (std::size_t k = 0; k < r.size(); ++k) {
@@ -101,18 +119,20 @@ Column Evidence::residual(const Prediction& prediction) const {
 }
 
 Column Evidence::sensitivity(const Prediction& base, const Prediction& changed, double step) const {
-  Prediction change(base.size());
+  SeriesOfChannels change(base.size());
   for (std::size_t c = 0; c < base.size(); ++c) {
-    change[c].resize(base[c].size());
-    for (std::size_t k = 0; k < base[c].size(); ++k)
-      change[c][k] = (changed[c][k] - base[c][k]) / step;
+    if (changed[c].shares(base[c])) continue;
+    const std::vector<double>&after = changed[c], &before = base[c];
+    change[c].resize(before.size());
+    for (std::size_t k = 0; k < before.size(); ++k) change[c][k] = (after[k] - before[k]) / step;
   }
   return whiten(change);
 }
 
-Column Evidence::whiten(const Prediction& change) const {
-  Column column(change.size());
+Column Evidence::whiten(const SeriesOfChannels& change) const {
+  Column::Channels column(change.size());
   for (std::size_t c = 0; c < change.size(); ++c) {
+    if (change[c].empty()) continue;
     std::vector<double> d(change[c].size(), 0.0);
     bool any = false;
     for (std::size_t k = 0; k < d.size(); ++k) {
@@ -206,21 +226,17 @@ RoleGrams Evidence::cross(const std::vector<const Column*>& a,
                           const std::vector<const Column*>& b) const {
   const auto rows = static_cast<Eigen::Index>(a.size()), cols = static_cast<Eigen::Index>(b.size());
   RoleGrams all{Eigen::MatrixXd::Zero(rows, cols), Eigen::MatrixXd::Zero(rows, cols)};
-  const auto part = [](const std::vector<float>& z, const Block& block) {
-    return Eigen::Map<const Eigen::VectorXf>(z.data() + block.begin,
-                                             static_cast<Eigen::Index>(block.end - block.begin))
-        .cast<double>();
-  };
   for (std::size_t c = 0; c < valid_.size(); ++c) {
     for (std::size_t j = 0; j < b.size(); ++j) {
-      if ((*b[j])[c].empty()) continue;
-      for (const Block& block : partition_.blocks) {
-        const Eigen::VectorXd y = part((*b[j])[c], block);
-        Eigen::MatrixXd& sum = block.held_out ? all.held_out : all.fitted;
-        for (std::size_t i = 0; i < a.size(); ++i)
-          if (!(*a[i])[c].empty())
-            sum(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) +=
-                part((*a[i])[c], block).dot(y);
+      const std::vector<float>& y = (*b[j])[c];
+      if (y.empty()) continue;
+      for (std::size_t i = 0; i < a.size(); ++i) {
+        const std::vector<float>& x = (*a[i])[c];
+        if (x.empty()) continue;
+        for (const Block& block : partition_.blocks)
+          (block.held_out ? all.held_out : all.fitted)(static_cast<Eigen::Index>(i),
+                                                       static_cast<Eigen::Index>(j)) +=
+              dot(&x[block.begin], &y[block.begin], block.end - block.begin);
       }
     }
   }

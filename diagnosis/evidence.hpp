@@ -12,6 +12,8 @@
 
 #include <Eigen/Dense>
 #include <cstddef>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/noise_audit.hpp"
@@ -21,10 +23,27 @@
 
 namespace vcnc {
 
-/// Whitened numbers, one series per channel; a channel that is zero throughout is empty.
-using Column = std::vector<std::vector<float>>;
-/// One series per channel in SI, as a replica predicts them.
-using Prediction = std::vector<std::vector<double>>;
+/// Whitened numbers, one series per channel; a channel that is zero throughout is empty. They never
+/// change; copies share them.
+class Column {
+ public:
+  using Channels = std::vector<std::vector<float>>;
+
+  Column() = default;
+  Column(Channels channels) : channels_(std::make_shared<const Channels>(std::move(channels))) {}
+
+  std::size_t size() const { return channels_ ? channels_->size() : 0; }
+  const std::vector<float>& operator[](std::size_t channel) const { return (*channels_)[channel]; }
+  bool zero() const;
+  /// Whether both are the same numbers by being the same object.
+  bool shares(const Column& other) const { return channels_ == other.channels_; }
+
+ private:
+  std::shared_ptr<const Channels> channels_;
+};
+
+/// One series per channel in SI.
+using SeriesOfChannels = std::vector<std::vector<double>>;
 
 /// Products of columns, one matrix per block.
 using BlockGrams = std::vector<Eigen::MatrixXd>;
@@ -56,7 +75,7 @@ class Evidence {
   /// W (changed - base) / step.
   Column sensitivity(const Prediction& base, const Prediction& changed, double step) const;
   /// W d for a change of the prediction given as such.
-  Column whiten(const Prediction& change) const;
+  Column whiten(const SeriesOfChannels& change) const;
 
   /// Samples of a channel that count.
   double count(std::size_t channel, Role role) const;
@@ -83,7 +102,8 @@ class Evidence {
   const Record& record_;
   Replica& replica_;
   Partition partition_;
-  Prediction measured_, declared_;
+  SeriesOfChannels measured_;
+  Prediction declared_;
   std::vector<std::vector<char>> raw_valid_, valid_;
   NoiseAudit noise_;
 };

@@ -33,7 +33,7 @@ Course course_of(const Series& q, double period) {
 /// How the channels answer at one axis.
 struct Response {
   bool moves = false;
-  Prediction displacement;           ///< change per metre (or radian) of displacement
+  SeriesOfChannels displacement;     ///< change per metre (or radian) of displacement
   std::vector<Series> force;         ///< impulse response per newton, per channel
   std::vector<char> through_motion;  ///< the channel sees the axis through its position
 };
@@ -171,7 +171,7 @@ class Laws {
       if (std::abs(v[k]) > std::abs(v[fastest])) fastest = k;
     const double time = evidence_.record().begin + static_cast<double>(fastest) * period_;
     const double size = is_rotary(i) ? 1 : 50;
-    const Prediction answer = difference(pulse(i, time, size), period_ / (size * kPulse));
+    const SeriesOfChannels answer = difference(pulse(i, time, size), period_ / (size * kPulse));
     const auto length = static_cast<std::size_t>(std::round(0.3 / period_));
     const auto lead = static_cast<std::size_t>(std::round(kPulse / period_));
     for (std::size_t c = 0; c < channels.size(); ++c) {
@@ -187,14 +187,17 @@ class Laws {
     return r;
   }
 
-  Prediction difference(const Law& law, double scale) const {
+  SeriesOfChannels difference(const Law& law, double scale) const {
     Machine machine = at_.machine;
     machine.effects.laws.push_back(law);
-    Prediction p = evidence_.predict(machine);
-    for (std::size_t c = 0; c < p.size(); ++c)
+    const Prediction p = evidence_.predict(machine);
+    SeriesOfChannels d;
+    for (std::size_t c = 0; c < p.size(); ++c) {
+      d.emplace_back(p[c].size());
       for (std::size_t k = 0; k < p[c].size(); ++k)
-        p[c][k] = (p[c][k] - at_.prediction[c][k]) * scale;
-    return p;
+        d[c][k] = (p[c][k] - at_.prediction[c][k]) * scale;
+    }
+    return d;
   }
 
   /// y of a law at every sample.
@@ -218,11 +221,11 @@ class Laws {
     return out;
   }
 
-  Prediction change(const Law& law) const {
+  SeriesOfChannels change(const Law& law) const {
     const Response& r = responses_[law.axis_index()];
     const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
     const Series y = strength(law);
-    Prediction p(channels.size(), Series(y.size(), 0.0));
+    SeriesOfChannels p(channels.size(), Series(y.size(), 0.0));
     Series motion = y;
     if (law.point == Law::Point::table_force) {
       const auto lead = static_cast<std::size_t>(std::round(kPulse / period_));

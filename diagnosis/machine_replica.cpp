@@ -66,6 +66,8 @@ class MachineReplica::Memory {
  public:
   explicit Memory(std::size_t capacity) : capacity_(capacity) {}
 
+  void clear() { kept_.clear(); }
+
   /// What is kept under `print`, or what `make` makes of it now.
   template <class Make>
   std::shared_ptr<const T> find_or_make(const std::string& print, Make&& make) {
@@ -97,11 +99,16 @@ struct MachineReplica::Hypothesis {
   Machine machine;            ///< without chance, starting where the record does
   Machine actual;             ///< with its deviations applied
   PerAxis<std::string> axis;  ///< fingerprints
+  std::string contact;        ///< without the axes
   std::string ball, sensing;
 };
 
 struct MachineReplica::Anchor {
-  std::string ball, sensing;
+  Anchor(const Hypothesis& h, const AxisReplays& axes)
+      : contact(h.contact), ball(h.ball), sensing(h.sensing), poses(h.actual, axes) {}
+
+  std::string contact, ball, sensing;
+  NearbyPoses poses;
   bool needs_full = false;
   ProbeReplay full;
   Deflections ball_offset;     ///< full less quick
@@ -137,7 +144,7 @@ MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine)
     if (!motion_.position[axis].empty())
       h.machine.axes[axis].limits.start = h.actual.axes[axis].limits.start =
           motion_.position[axis].front();
-  h.ball = fingerprint_of_contact(h.actual);
+  h.ball = h.contact = fingerprint_of_contact(h.actual);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     h.axis[axis] = fingerprint_of_axis(h.machine, h.actual, axis);
     h.ball += h.axis[axis];
@@ -149,31 +156,41 @@ MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine)
 AxisReplays MachineReplica::axes_of(const Hypothesis& h) const {
   AxisReplays replays;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    replays[axis] = axis_memory_[axis]->find_or_make(
-        h.axis[axis], [&] { return replay_axis(h.machine, h.actual, axis, motion_); });
+    replays[axis] =
+        axis_memory_[axis]->find_or_make(h.axis[axis], [&] { return replayed(h, axis); });
   return replays;
+}
+
+/// With its signals at the record's samples.
+AxisReplay MachineReplica::replayed(const Hypothesis& h, std::size_t axis) const {
+  AxisReplay replay = replay_axis(h.machine, h.actual, axis, motion_);
+  for (SharedSeries* s : {&replay.measured, &replay.twist, &replay.force}) *s = as_recorded(*s);
+  return replay;
 }
 
 /// Quickly.
 std::shared_ptr<const Deflections> MachineReplica::ball_of(const Hypothesis& h,
                                                            const AxisReplays& axes) const {
-  return ball_memory_->find_or_make(h.ball,
-                                    [&] { return replay_contact(h.actual, piece_.get(), axes); });
+  return ball_memory_->find_or_make(h.ball, [&] {
+    const bool same = h.contact == anchor_->contact;
+    return replay_contact(h.actual, piece_.get(),
+                          same ? anchor_->poses.at(axes) : replay_poses(h.actual, axes));
+  });
 }
 
 void MachineReplica::anchor(const Machine& machine) {
   if (!probes_) return;
   const Hypothesis h = hypothesis_of(machine);
   const AxisReplays axes = axes_of(h);
-  auto anchor = std::make_unique<Anchor>();
-  anchor->ball = h.ball;
-  anchor->sensing = h.sensing;
+  auto anchor = std::make_unique<Anchor>(h, axes);
   anchor->needs_full = needs_full_probe(h.actual);
   anchor->full = replay_probe(h.actual, piece_.get(), axes);
-  anchor->ball_offset = sum(anchor->full.ball, *ball_of(h, axes), -1);
+  const Deflections quick = replay_contact(h.actual, piece_.get(), anchor->poses.poses());
+  anchor->ball_offset = sum(anchor->full.ball, quick, -1);
   anchor->reading_offset =
       sum(anchor->full.reading, replay_sensing(h.actual, anchor->full.ball, axes), -1);
   anchor_ = std::move(anchor);
+  ball_memory_->clear();  // it holds what was seen from another anchor
 }
 
 Deflections MachineReplica::reading_of(const Hypothesis& h, const AxisReplays& axes) const {
@@ -202,19 +219,18 @@ std::vector<double> MachineReplica::as_recorded(const std::vector<double>& per_c
   return result;
 }
 
-std::vector<std::vector<double>> MachineReplica::assembled(const AxisReplays& axes,
-                                                           const Deflections& reading) const {
-  std::vector<std::vector<double>> all;
+Prediction MachineReplica::assembled(const AxisReplays& axes, const Deflections& reading) const {
+  Prediction all;
   for (const ComparedChannel& channel : channels_) {
     switch (channel.kind) {
       case SignalKind::position:
-        all.push_back(as_recorded(axes[channel.axis]->measured));
+        all.push_back(axes[channel.axis]->measured);
         break;
       case SignalKind::twist:
-        all.push_back(as_recorded(axes[channel.axis]->twist));
+        all.push_back(axes[channel.axis]->twist);
         break;
       case SignalKind::force:
-        all.push_back(as_recorded(axes[channel.axis]->force));
+        all.push_back(axes[channel.axis]->force);
         break;
       default:
         all.push_back(as_recorded(reading[channel.axis]));
@@ -224,17 +240,17 @@ std::vector<std::vector<double>> MachineReplica::assembled(const AxisReplays& ax
   return all;
 }
 
-std::vector<std::vector<double>> MachineReplica::predict(const Machine& machine) const {
+Prediction MachineReplica::predict(const Machine& machine) const {
   const Hypothesis h = hypothesis_of(machine);
   const AxisReplays axes = axes_of(h);
   return assembled(axes, probes_ ? reading_of(h, axes) : Deflections{});
 }
 
-std::vector<std::vector<double>> MachineReplica::predict_in_full(const Machine& machine) const {
+Prediction MachineReplica::predict_in_full(const Machine& machine) const {
   const Hypothesis h = hypothesis_of(machine);
   AxisReplays axes;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    axes[axis] = std::make_shared<AxisReplay>(replay_axis(h.machine, h.actual, axis, motion_));
+    axes[axis] = std::make_shared<AxisReplay>(replayed(h, axis));
   return assembled(axes,
                    probes_ ? replay_probe(h.actual, piece_.get(), axes).reading : Deflections{});
 }

@@ -44,9 +44,9 @@ class MachineReplica : public Replica {
   ~MachineReplica() override;
 
   const std::vector<ComparedChannel>& channels() const override { return channels_; }
-  std::vector<std::vector<double>> predict(const Machine& hypothesis) const override;
+  Prediction predict(const Machine& hypothesis) const override;
   /// The same with the probe in full, too, and without the memory of earlier predictions.
-  std::vector<std::vector<double>> predict_in_full(const Machine& hypothesis) const;
+  Prediction predict_in_full(const Machine& hypothesis) const;
 
   /// What follows is asked about machines near this one. Not while others predict.
   void anchor(const Machine& machine) override;
@@ -63,8 +63,8 @@ class MachineReplica : public Replica {
   std::shared_ptr<const Deflections> ball_of(const Hypothesis& hypothesis,
                                              const AxisReplays& axes) const;
   Deflections reading_of(const Hypothesis& hypothesis, const AxisReplays& axes) const;
-  std::vector<std::vector<double>> assembled(const AxisReplays& axes,
-                                             const Deflections& reading) const;
+  AxisReplay replayed(const Hypothesis& hypothesis, std::size_t axis) const;
+  Prediction assembled(const AxisReplays& axes, const Deflections& reading) const;
   std::vector<double> as_recorded(const std::vector<double>& per_cycle) const;
 
   Machine declared_;

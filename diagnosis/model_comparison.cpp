@@ -24,7 +24,7 @@ ModelResiduals model_residuals(const Record& record, const Replica& replica, con
   ModelResiduals result;
   result.channels = replica.channels();
   const std::vector<char> inside = inside_stretches(record);
-  const auto less = [&](const std::vector<std::vector<double>>& predicted) {
+  const auto less = [&](const Prediction& predicted) {
     std::vector<std::vector<double>> residual;
     for (std::size_t c = 0; c < result.channels.size(); ++c) {
       const auto [kind, axis] = result.channels[c];

@@ -32,6 +32,11 @@ void read_motions(const AxisReplays& axes, std::size_t cycle, Motions<double>& m
   }
 }
 
+/// Of one axis at the end of a cycle.
+double position_at(const AxisReplays& axes, std::size_t axis, std::size_t cycle) {
+  return axes[axis]->truth[(cycle + 1) * kTruthPerCycle - 1];
+}
+
 AxisVector positions(const Motions<double>& motions) {
   AxisVector q;
   for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = motions[i].position;
@@ -164,28 +169,67 @@ ProbeReplay replay_probe(const Machine& actual, const Piece* piece, const AxisRe
   return replay;
 }
 
-Deflections replay_contact(const Machine& actual, const Piece* piece, const AxisReplays& axes) {
+Poses replay_poses(const Machine& actual, const AxisReplays& axes) {
   const std::size_t cycles = axes[0]->truth.size() / kTruthPerCycle;
-  Deflections ball;
-  for (std::vector<double>& b : ball) b.resize(cycles);
+  Poses poses(cycles);
   const Kinematics kinematics(actual.kinematics, actual.probe.length, actual.setup.work_offset[0]);
   Chain<PosePort> errors = machine_chain<PosePort>(actual.effects, kSeed);
-  CoarseContact contact(actual, piece);
   PosePort::Context<double> context;
   for (std::size_t k = 0; k < cycles; ++k) {
     read_motions(axes, k, context.axes);
     const AxisVector q = positions(context.axes);
-    ToolPose pose;
     if (errors.empty()) {
-      pose = kinematics.forward(q);
-    } else {
-      context.moment = moment_of(k);
-      context.arm = kinematics.arms(q);
-      GeometryErrors<double> error;
-      errors.step(error, context);
-      pose = kinematics.forward(q, error);
+      poses[k] = kinematics.forward(q);
+      continue;
     }
-    const Vec3 deflection = contact.step(pose, k);
+    context.moment = moment_of(k);
+    context.arm = kinematics.arms(q);
+    GeometryErrors<double> error;
+    errors.step(error, context);
+    poses[k] = kinematics.forward(q, error);
+  }
+  return poses;
+}
+
+NearbyPoses::NearbyPoses(const Machine& actual, const AxisReplays& axes)
+    : axes_(axes), poses_(replay_poses(actual, axes)), changes_(poses_.size()) {
+  const Kinematics kinematics(actual.kinematics, actual.probe.length, actual.setup.work_offset[0]);
+  const double a_sign = actual.kinematics.a_reversed ? -1 : 1,
+               c_sign = actual.kinematics.c_reversed ? -1 : 1;
+  for (std::size_t k = 0; k < poses_.size(); ++k) {
+    AxisVector q;
+    for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = position_at(axes, i, k);
+    // Whatever turns the pose against the ideal one turns its changes, too.
+    const Mat3 turned = poses_[k].R_WT * kinematics.forward(q).R_WT.transpose();
+    const double c = c_sign * q[kC];
+    changes_[k] = {turned * kinematics.jacobian(q),
+                   turned * (a_sign * Vec3(std::cos(c), std::sin(c), 0)),
+                   turned * (c_sign * Vec3::UnitZ())};
+  }
+}
+
+Poses NearbyPoses::at(const AxisReplays& axes) const {
+  Poses moved = poses_;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    if (axes[i] == axes_[i]) continue;
+    for (std::size_t k = 0; k < moved.size(); ++k) {
+      const double dq = position_at(axes, i, k) - position_at(axes_, i, k);
+      moved[k].p_WT += changes_[k].J.col(static_cast<Eigen::Index>(i)) * dq;
+      if (!is_rotary(i)) continue;
+      const Vec3 turn = (i == kA ? changes_[k].w_A : changes_[k].w_C) * dq;
+      for (Eigen::Index c = 0; c < 3; ++c)
+        moved[k].R_WT.col(c) += turn.cross(poses_[k].R_WT.col(c));
+    }
+  }
+  return moved;
+}
+
+Deflections replay_contact(const Machine& actual, const Piece* piece, const Poses& poses) {
+  Deflections ball;
+  for (std::vector<double>& b : ball) b.resize(poses.size());
+  CoarseContact contact(actual, piece);
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const Vec3 deflection = contact.step(poses[k], k);
     for (std::size_t c = 0; c < 3; ++c) ball[c][k] = deflection[static_cast<Eigen::Index>(c)];
   }
   return ball;

@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "diagnosis/axis_replay.hpp"
+#include "model/geometry/kinematics.hpp"
 #include "model/geometry/piece.hpp"
 #include "model/machine.hpp"
 
@@ -43,8 +44,34 @@ struct ProbeReplay {
 /// In full. `actual` is a hypothesis with its deviations applied; `piece` may be null.
 ProbeReplay replay_probe(const Machine& actual, const Piece* piece, const AxisReplays& axes);
 
+/// Poses of the tool at the end of every cycle.
+using Poses = std::vector<ToolPose>;
+Poses replay_poses(const Machine& actual, const AxisReplays& axes);
+
+/// How poses change with the axes around a machine whose axes are `axes`:
+///
+///   p_WT' = p_WT + J dq,   R_WT' = (1 + [w_A dA + w_C dC]x) R_WT
+///
+/// What errors of the geometry do at another place is neglected, as are squares of dq.
+class NearbyPoses {
+ public:
+  NearbyPoses(const Machine& actual, const AxisReplays& axes);
+
+  const Poses& poses() const { return poses_; }
+  Poses at(const AxisReplays& axes) const;
+
+ private:
+  struct Change {
+    Eigen::Matrix<double, 3, 5> J;  ///< [m/m], [m/rad]
+    Vec3 w_A, w_C;                  ///< what R_WT turns about
+  };
+  AxisReplays axes_;
+  Poses poses_;
+  std::vector<Change> changes_;
+};
+
 /// Quickly: the true deflection of the ball.
-Deflections replay_contact(const Machine& actual, const Piece* piece, const AxisReplays& axes);
+Deflections replay_contact(const Machine& actual, const Piece* piece, const Poses& poses);
 /// Quickly: what the probe says of it.
 Deflections replay_sensing(const Machine& actual, const Deflections& ball, const AxisReplays& axes);
 

@@ -23,10 +23,9 @@ Eigen::MatrixXd bordered(const Eigen::MatrixXd& a, const Eigen::MatrixXd& cross,
   return all;
 }
 
-std::vector<const Column*> columns_of(const std::vector<const TrialColumns*>& trials) {
+std::vector<const Column*> pointers(const std::vector<Column>& columns) {
   std::vector<const Column*> all;
-  for (const TrialColumns* t : trials)
-    for (const Column& c : t->columns) all.push_back(&c);
+  for (const Column& c : columns) all.push_back(&c);
   return all;
 }
 
@@ -35,17 +34,20 @@ struct Gain {
   Eigen::VectorXd size;
 };
 
-Gain gain_of(const Evidence& evidence, const Ground& ground,
-             const std::vector<const TrialColumns*>& trials) {
-  const std::vector<const Column*> columns = columns_of(trials);
-  const RoleGrams across = evidence.cross(ground.columns, columns);
-  const RoleGrams own = evidence.cross(columns, columns);
-  const auto more = static_cast<Eigen::Index>(columns.size());
+/// Of columns with the products `across` with the ground and their `own`.
+Gain gain_of(const Ground& ground, const RoleGrams& across, const RoleGrams& own) {
+  const Eigen::Index more = own.fitted.rows();
   const LinearStep full =
       linear_step(bordered(ground.grams.fitted, across.fitted, own.fitted),
                   bordered(ground.grams.held_out, across.held_out, own.held_out),
                   padded(ground.precision, more), padded(ground.offset, more));
   return {ground.held_out - full.held_out, full.step.tail(more)};
+}
+
+Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  Eigen::MatrixXd both(a.rows(), a.cols() + b.cols());
+  both << a, b;
+  return both;
 }
 
 /// Whether the sizes are of a kind the candidate can have.
@@ -77,7 +79,6 @@ std::vector<TrialColumns> simulate_trials(const Evidence& evidence, const Machin
   for (std::size_t t = 0; t < trials.size(); ++t) {
     all[t].trial = std::move(trials[t]);
     all[t].columns.resize(all[t].trial.directions.size());
-    for (Column& c : all[t].columns) c.resize(prediction.size());
     for (std::size_t d = 0; d < all[t].columns.size(); ++d) jobs.emplace_back(t, d);
   }
   std::atomic<bool> go = true;
@@ -92,7 +93,41 @@ std::vector<TrialColumns> simulate_trials(const Evidence& evidence, const Machin
     const double share = static_cast<double>(++done) / static_cast<double>(jobs.size());
     if (!keep_going(share)) go = false;
   });
+  const Column nothing(Column::Channels(prediction.size()));
+  parallel_for(all.size(), [&](std::size_t t) {
+    for (Column& c : all[t].columns)
+      if (c.size() == 0) c = nothing;
+    const std::vector<const Column*> own = pointers(all[t].columns);
+    all[t].own = evidence.cross(own, own);
+  });
   return all;
+}
+
+void RememberedProducts::learn(const Evidence& evidence, const std::vector<const Column*>& others,
+                               const std::vector<Column>& columns) {
+  const auto known = [&](const Column* other) {
+    return std::find_if(others_.begin(), others_.end(),
+                        [&](const Column& c) { return c.shares(*other); });
+  };
+  std::vector<const Column*> missing;
+  for (const Column* other : others)
+    if (known(other) == others_.end()) missing.push_back(other);
+  const RoleGrams fresh = evidence.cross(missing, pointers(columns));
+  const auto rows = static_cast<Eigen::Index>(others.size()),
+             cols = static_cast<Eigen::Index>(columns.size());
+  RoleGrams all{Eigen::MatrixXd(rows, cols), Eigen::MatrixXd(rows, cols)};
+  Eigen::Index next = 0;
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const auto r = known(others[static_cast<std::size_t>(i)]);
+    const bool old = r != others_.end();
+    const RoleGrams& from = old ? products_ : fresh;
+    const Eigen::Index row = old ? r - others_.begin() : next++;
+    all.fitted.row(i) = from.fitted.row(row);
+    all.held_out.row(i) = from.held_out.row(row);
+  }
+  products_ = std::move(all);
+  others_.clear();
+  for (const Column* other : others) others_.push_back(*other);
 }
 
 Ground::Ground(const Evidence& evidence, const Column& residual, const LinearPart& linear)
@@ -112,13 +147,13 @@ void find_detection_limits(const Evidence& evidence, const Ground& ground,
   const Eigen::LDLT<Eigen::MatrixXd> factor(a);
   parallel_for(trials.size(), [&](std::size_t i) {
     TrialColumns& t = trials[i];
-    const RoleGrams across = evidence.cross(ground.columns, columns_of({&t}));
+    t.ground.learn(evidence, ground.columns, t.columns);
+    const RoleGrams& across = t.ground.products();
     double information = 0;  // of the best direction, in steps
     for (std::size_t d = 0; d < t.columns.size(); ++d) {
-      const RoleGrams own = evidence.cross({&t.columns[d]}, {&t.columns[d]});
-      const double all = own.fitted(0, 0) + own.held_out(0, 0);
-      const Eigen::VectorXd nc =
-          (across.fitted + across.held_out).block(1, static_cast<Eigen::Index>(d), n, 1);
+      const auto at = static_cast<Eigen::Index>(d);
+      const double all = t.own.fitted(at, at) + t.own.held_out(at, at);
+      const Eigen::VectorXd nc = (across.fitted + across.held_out).block(1, at, n, 1);
       const double left = all - (n > 0 ? nc.dot(factor.solve(nc)) : 0);
       // What is left of a column that the others can make up is rounding.
       if (left > 1e-6 * all) information = std::max(information, left);
@@ -130,18 +165,16 @@ void find_detection_limits(const Evidence& evidence, const Ground& ground,
 
 std::vector<Screened> screen(const Evidence& evidence, const Ground& ground,
                              const std::vector<Candidate>& candidates,
-                             const std::vector<TrialColumns>& trials) {
+                             std::vector<TrialColumns>& trials) {
   std::vector<Screened> all(trials.size());
   parallel_for(trials.size(), [&](std::size_t i) {
     all[i].trial = i;
-    const bool excited =
-        std::any_of(trials[i].columns.begin(), trials[i].columns.end(), [](const Column& c) {
-          return std::any_of(c.begin(), c.end(), [](const auto& z) { return !z.empty(); });
-        });
-    if (!excited) return;
-    Gain g = gain_of(evidence, ground, {&trials[i]});
-    const Trial& trial = trials[i].trial;
-    if (possible(candidates[trial.candidate], trial, g.size)) all[i].gain = g.gain;
+    TrialColumns& t = trials[i];
+    if (std::all_of(t.columns.begin(), t.columns.end(), [](const Column& c) { return c.zero(); }))
+      return;
+    t.ground.learn(evidence, ground.columns, t.columns);
+    Gain g = gain_of(ground, t.ground.products(), t.own);
+    if (possible(candidates[t.trial.candidate], t.trial, g.size)) all[i].gain = g.gain;
     all[i].size = std::move(g.size);
   });
   std::vector<Screened> best;
@@ -159,7 +192,12 @@ std::vector<Screened> screen(const Evidence& evidence, const Ground& ground,
 
 double pair_gain(const Evidence& evidence, const Ground& ground, const TrialColumns& a,
                  const TrialColumns& b, Eigen::VectorXd& size) {
-  Gain g = gain_of(evidence, ground, {&a, &b});
+  const RoleGrams &with_a = a.ground.products(), &with_b = b.ground.products(),
+                  ab = evidence.cross(pointers(a.columns), pointers(b.columns));
+  Gain g = gain_of(ground,
+                   {beside(with_a.fitted, with_b.fitted), beside(with_a.held_out, with_b.held_out)},
+                   {bordered(a.own.fitted, ab.fitted, b.own.fitted),
+                    bordered(a.own.held_out, ab.held_out, b.own.held_out)});
   size = std::move(g.size);
   return g.gain;
 }

@@ -16,10 +16,25 @@
 
 namespace vcnc {
 
+/// Products of some columns with others, remembered by the other column.
+class RememberedProducts {
+ public:
+  /// Computes what is not known yet of `columns` with `others`, and forgets all else.
+  void learn(const Evidence& evidence, const std::vector<const Column*>& others,
+             const std::vector<Column>& columns);
+  const RoleGrams& products() const { return products_; }  ///< of what was learnt last
+
+ private:
+  std::vector<Column> others_;  ///< of each row
+  RoleGrams products_;
+};
+
 /// A trial with the columns of its directions, per step.
 struct TrialColumns {
   Trial trial;
   std::vector<Column> columns;
+  RoleGrams own;  ///< products of the columns with each other
+  RememberedProducts ground;
   double detection_limit = std::numeric_limits<double>::infinity();  ///< of its first number
 };
 
@@ -55,9 +70,9 @@ void find_detection_limits(const Evidence& evidence, const Ground& ground,
 /// Gains of all trials on a residual, the best trial of every candidate, best first.
 std::vector<Screened> screen(const Evidence& evidence, const Ground& ground,
                              const std::vector<Candidate>& candidates,
-                             const std::vector<TrialColumns>& trials);
+                             std::vector<TrialColumns>& trials);
 
-/// Gain of two trials together.
+/// Gain of two trials together that were screened on this ground.
 double pair_gain(const Evidence& evidence, const Ground& ground, const TrialColumns& a,
                  const TrialColumns& b, Eigen::VectorXd& size);
 

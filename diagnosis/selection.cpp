@@ -67,6 +67,10 @@ void linearise_nuisances(const Evidence& evidence, FittedMachine& m) {
   });
 }
 
+constexpr int kGlance = 4;        ///< iterations to see what a candidate is worth
+constexpr double kClearLoss = 4;  ///< times the least gain: no need to look closer
+constexpr std::size_t kRivals = 4;
+
 /// What a candidate came to.
 struct Contender {
   std::size_t candidate = 0;
@@ -105,6 +109,7 @@ class Search {
       }
       now = std::move(trial);
       drop(now);
+      exchange(now);
       tell_rung(now);
     }
     result_.interrupted = !going_;
@@ -190,10 +195,11 @@ class Search {
     std::atomic<std::size_t> done = 0;
     parallel_for(list.size(), [&](std::size_t i) {
       if (!going_) return;
-      all[i] = contender(now, linear, ground, {list[i].trial}, list[i].size);
+      all[i] = contender(now, linear, ground, {list[i].trial}, list[i].size, list[i].gain);
       go("refitting " + std::to_string(list.size()) + " candidates",
          static_cast<double>(++done) / static_cast<double>(list.size()));
     });
+    finish(now, linear, ground, all);
     for (Contender& c : releases(now, linear, ground)) all.push_back(std::move(c));
     const double needed = threshold(ground.held_out);
     std::erase_if(all, [&](const Contender& c) {
@@ -212,9 +218,11 @@ class Search {
   }
 
   Contender contender(const FittedMachine& now, const LinearPart& linear, const Ground& ground,
-                      const std::vector<std::size_t>& trials, const Eigen::VectorXd& size) {
+                      const std::vector<std::size_t>& trials, const Eigen::VectorXd& size,
+                      double promised) {
     Contender best;
-    // From where the sensitivities point to, and from half the way: some effects are not linear.
+    // From where the sensitivities point to, and from a third of the way: some effects are not
+    // linear and disappoint.
     for (const double share : {1.0, 0.3}) {
       Contender c;
       Eigen::Index at = 0;
@@ -228,14 +236,28 @@ class Search {
       }
       c.candidate = result_.trials[trials.front()].trial.candidate;
       const LinearPart others = without(linear, c.numbers);
-      c.fit = refit(evidence_, now.machine, c.numbers, others);
+      c.fit = refit(evidence_, now.machine, c.numbers, others, kGlance);
       c.numbers = c.fit.live;
       c.gain = ground.held_out - c.fit.held_out;
       const bool first = share == 1.0;
       if (first || c.gain > best.gain) best = std::move(c);
-      if (best.gain > 0.5 * excess(ground.held_out)) break;
+      if (best.gain > 0.5 * promised) break;
     }
     return best;
+  }
+
+  /// Converges those contenders that may yet be the best.
+  void finish(const FittedMachine& now, const LinearPart& linear, const Ground& ground,
+              std::vector<Contender>& all) {
+    double best = 0;
+    for (const Contender& c : all) best = std::max(best, c.gain);
+    const double near = best - options_.class_gain - 0.3 * (excess(ground.held_out) - best);
+    for (Contender& c : all) {
+      if (!going_ || c.released.size() > 0 || c.gain < std::min(near, 0.9 * best)) continue;
+      c.fit = refit(evidence_, now.machine, c.numbers, without(linear, c.numbers));
+      c.numbers = c.fit.live;
+      c.gain = ground.held_out - c.fit.held_out;
+    }
   }
 
   /// A declared number whose tolerance is lifted competes with the effects.
@@ -317,8 +339,8 @@ class Search {
     const double least = std::max(threshold(ground.held_out), 0.1 * excess(ground.held_out));
     if (gains[best] < single + least) return;
     const auto [i, j] = pairs[best];
-    Contender c =
-        contender(now, linear, ground, {screened[i].trial, screened[j].trial}, sizes[best]);
+    Contender c = contender(now, linear, ground, {screened[i].trial, screened[j].trial},
+                            sizes[best], gains[best]);
     if (c.gain > single + least) all.insert(all.begin(), std::move(c));
   }
 
@@ -371,25 +393,80 @@ class Search {
 
   /// Removes what the others can do without, and says what each one is worth.
   void drop(FittedMachine& m) {
-    if (m.added.size() < 2) {
-      for (AddedEffect& a : m.added) a.gain = loss_without(m, 0);
-      return;
-    }
-    for (bool dropped = true; dropped && m.added.size() > 1;) {
-      dropped = false;
+    while (going_) {
       std::vector<double> loss(m.added.size());
-      std::vector<FittedMachine> less(m.added.size());
-      for (std::size_t i = 0; i < m.added.size(); ++i) {
-        less[i] = removed(m, i);
-        loss[i] = less[i].held_out - m.held_out;
-        m.added[i].gain = loss[i];
-      }
+      for (std::size_t i = 0; i < m.added.size(); ++i)
+        m.added[i].gain = loss[i] = loss_without(m, i);
+      if (m.added.size() < 2) return;
       const auto least =
           static_cast<std::size_t>(std::min_element(loss.begin(), loss.end()) - loss.begin());
-      if (loss[least] < options_.least_gain) {
-        m = std::move(less[least]);
-        dropped = true;
+      if (loss[least] > kClearLoss * options_.least_gain) return;
+      FittedMachine less = removed(m, least);
+      m.added[least].gain = less.held_out - m.held_out;
+      if (m.added[least].gain >= options_.least_gain) return;
+      m = std::move(less);
+    }
+  }
+
+  /// What one added effect is worth: without it, all others moved along their columns.
+  double loss_without(const FittedMachine& m, std::size_t i) const {
+    const FittedMachine less = taken_out(m, i);
+    const Ground ground(evidence_, less.residual, less.linear());
+    return ground.held_out - m.held_out;
+  }
+
+  /// Without one of its effects, everything else as it was.
+  FittedMachine taken_out(const FittedMachine& m, std::size_t i) const {
+    FittedMachine less = m;
+    std::size_t first = 0;
+    for (std::size_t j = 0; j < i; ++j) first += m.added[j].numbers.size();
+    const auto from = less.columns.begin() + static_cast<std::ptrdiff_t>(first);
+    less.columns.erase(from, from + static_cast<std::ptrdiff_t>(m.added[i].numbers.size()));
+    less.added.erase(less.added.begin() + static_cast<std::ptrdiff_t>(i));
+    for (const FreeNumber& n : candidates_[m.added[i].candidate].numbers)
+      move_number(less.machine, n.key, number_of(declared_, n.key));
+    less.prediction = evidence_.predict(less.machine);
+    less.residual = evidence_.residual(less.prediction);
+    less.held_out = Ground(evidence_, less.residual, less.linear()).held_out;
+    return less;
+  }
+
+  /// Effects that were accepted when others were still missing may be stand-ins: each is taken out
+  /// and all candidates compete for its place.
+  void exchange(FittedMachine& m) {
+    for (std::size_t i = 0; i < m.added.size() && going_; ++i) {
+      if (m.added.size() < 2) return;
+      const FittedMachine less = taken_out(m, i);
+      const LinearPart linear = less.linear();
+      const Ground ground(evidence_, less.residual, linear);
+      const double lost = ground.held_out - m.held_out;
+      std::vector<Screened> screened = screen(evidence_, ground, candidates_, result_.trials);
+      std::erase_if(screened, [&](const Screened& s) {
+        return s.gain < 0.8 * lost ||
+               std::any_of(m.added.begin(), m.added.end(),
+                           [&](const AddedEffect& a) { return a.candidate == candidate_of(s); });
+      });
+      if (screened.size() > kRivals) screened.resize(kRivals);
+      std::vector<Contender> rivals;
+      for (const Screened& s : screened)
+        rivals.push_back(contender(less, linear, ground, {s.trial}, s.size, s.gain));
+      std::stable_sort(rivals.begin(), rivals.end(),
+                       [](const Contender& x, const Contender& y) { return worth(x) > worth(y); });
+      const double band = options_.class_gain + options_.class_share * excess(m.held_out);
+      m.added[i].class_with.clear();
+      for (const Contender& r : rivals)
+        if (r.gain > std::max(lost - band, 0.5 * lost))
+          m.added[i].class_with.push_back(r.candidate);
+      if (rivals.empty() ||
+          worth(rivals.front()) < lost - 4 * static_cast<double>(m.added[i].numbers.size()))
+        continue;
+      FittedMachine other = less;
+      add(other, {rivals.front()}, {});
+      if (other.held_out > m.held_out - options_.least_gain) {
+        evidence_.anchor(m.machine);
+        continue;
       }
+      m = std::move(other);
     }
   }
 
@@ -401,10 +478,6 @@ class Search {
     converge(evidence_, less);
     return less;
   }
-  double loss_without(const FittedMachine& m, std::size_t i) const {
-    return removed(m, i).held_out - m.held_out;
-  }
-
   void tell_rung(const FittedMachine& m) {
     result_.rung_chi2.push_back(m.held_out);
     std::string name = m.added.empty() ? "" : candidates_[m.added.back().candidate].name();
@@ -446,7 +519,7 @@ LinearPart FittedMachine::linear() const {
 }
 
 void converge(const Evidence& evidence, FittedMachine& m) {
-  constexpr int kRounds = 4;
+  constexpr int kRounds = 3;
   double before = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kRounds; ++round) {
     const std::vector<FreedNumber> live = m.numbers();
@@ -467,8 +540,7 @@ FittedMachine fit_declared(Evidence& evidence, const Machine& declared) {
   // What the run cannot show stays at its declaration.
   LinearPart shown;
   for (std::size_t i = 0; i < m.nuisances.numbers.size(); ++i) {
-    const Column& c = m.nuisances.columns[i];
-    if (std::none_of(c.begin(), c.end(), [](const auto& z) { return !z.empty(); })) continue;
+    if (m.nuisances.columns[i].zero()) continue;
     shown.numbers.push_back(m.nuisances.numbers[i]);
     shown.columns.push_back(std::move(m.nuisances.columns[i]));
   }

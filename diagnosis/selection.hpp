@@ -6,6 +6,7 @@
 //     refit                  the best few nonlinearly (refit.hpp); pairs where no one explains half
 //     accept                 the one with the largest gain on held-out laps, if it is enough
 //     converge, drop test    all together; what is no longer needed goes
+//     exchange               each one taken out, all candidates compete for its place
 //
 // A gain is chi-square on held-out laps (whose expectation is their number of samples when nothing
 // but noise is left) and of the priors of the declared numbers. It must exceed 25 and 2 % of the

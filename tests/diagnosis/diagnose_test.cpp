@@ -93,7 +93,7 @@ TEST(Diagnose, AttributesNothingToLapsShuffledBetweenConditions) {
   for (std::uint64_t seed = 20; seed < 23; ++seed) {
     Record record = measured(truth, seed);
     toy::ToyReplica replica(record);
-    const std::vector<std::vector<double>> healthy = replica.predict(declared);
+    const Prediction healthy = replica.predict(declared);
     // Laps take their residual from another condition, those that are fitted from another one
     // than those that are held out.
     const Record from = record;

@@ -41,7 +41,7 @@ struct Misfit {
   double rms = 0, largest = 0;
 };
 inline Misfit misfit(const RecordedRun& run, const MachineReplica& replica,
-                     const std::vector<std::vector<double>>& prediction, SignalKind kind,
+                     const Prediction& prediction, SignalKind kind,
                      bool rotary = false) {
   Misfit result;
   double sum = 0, count = 0;

@@ -10,13 +10,11 @@
 namespace vcnc {
 namespace {
 
-using Prediction = std::vector<std::vector<double>>;
-
 bool same_bits(const Prediction& a, const Prediction& b) {
   if (a.size() != b.size()) return false;
   for (std::size_t c = 0; c < a.size(); ++c)
-    if (a[c].size() != b[c].size() ||
-        std::memcmp(a[c].data(), b[c].data(), a[c].size() * sizeof(double)) != 0)
+    if (a[c].size() != b[c].size() || std::memcmp(&*a[c].begin(), &*b[c].begin(),
+                                                  a[c].size() * sizeof(double)) != 0)
       return false;
   return true;
 }

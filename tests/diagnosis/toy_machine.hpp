@@ -54,7 +54,7 @@ class ToyReplica : public Replica {
   }
   const std::vector<ComparedChannel>& channels() const override { return channels_; }
 
-  std::vector<std::vector<double>> predict(const Machine& m) const override {
+  Prediction predict(const Machine& m) const override {
     const std::vector<double>& x = commands_.find(SignalKind::command, 0)->value;
     const std::vector<double>& y = commands_.find(SignalKind::command, 1)->value;
     const auto& e = m.effects.axis[0];
@@ -84,7 +84,7 @@ class ToyReplica : public Replica {
         if (law.point == Law::Point::displacement && law.axis == Law::OfAxis::X)
           all[2][k] += law(static_cast<double>(k) * h, motions);
     }
-    return all;
+    return {all.begin(), all.end()};
   }
 
  private:
@@ -95,7 +95,8 @@ class ToyReplica : public Replica {
 /// What `truth` would have measured, with white noise.
 inline void measure(Record& record, const Machine& truth, std::uint64_t seed) {
   const ToyReplica replica(record);
-  std::vector<std::vector<double>> all = replica.predict(truth);
+  const Prediction clean = replica.predict(truth);
+  std::vector<std::vector<double>> all(clean.begin(), clean.end());
   const double noise[] = {kPositionNoise, kForceNoise, kProbeNoise};
   std::erase_if(record.signals, [](const auto& s) { return s.kind != SignalKind::command; });
   for (std::size_t c = 0; c < all.size(); ++c) {
