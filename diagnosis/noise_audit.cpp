@@ -141,8 +141,9 @@ double running_median(const Series& power, std::size_t at) {
   return *middle;
 }
 
+/// Those of an amplitude of more than `least` [SI].
 std::vector<NoiseLine> find_lines(const ComparedChannel& channel, const std::vector<LapNoise>& laps,
-                                  double period) {
+                                  double period, double least) {
   constexpr double kStrength = 40;
   constexpr std::size_t kLowest = 8;
   std::vector<NoiseLine> lines;
@@ -164,7 +165,7 @@ std::vector<NoiseLine> find_lines(const ComparedChannel& channel, const std::vec
     const double frequency = (static_cast<double>(k) + shift) * bin;
     // A sine of amplitude A has |X|^2/n = n (A/4)^2 under this window.
     const double amplitude = 4 * std::sqrt(power[k] / static_cast<double>(laps.size()) / mean_lap);
-    lines.push_back({channel, frequency, power[k] / median, amplitude});
+    if (amplitude > least) lines.push_back({channel, frequency, power[k] / median, amplitude});
   }
   std::sort(lines.begin(), lines.end(),
             [](const NoiseLine& x, const NoiseLine& y) { return x.strength > y.strength; });
@@ -237,7 +238,8 @@ NoiseAudit audit_noise(const Record& record, const Partition& partition,
     // Where the laps are quieter than the channel can be, what it can be counts.
     noise.filter.scale = std::sqrt(quiet ? expected : left);
     if (audit.from_repetitions) {
-      const std::vector<NoiseLine> lines = find_lines(channels[c], laps, record.period);
+      const std::vector<NoiseLine> lines =
+          find_lines(channels[c], laps, record.period, 0.1 * std::sqrt(least));
       audit.lines.insert(audit.lines.end(), lines.begin(), lines.end());
     }
     audit.channels.push_back(std::move(noise));

@@ -67,9 +67,10 @@ void linearise_nuisances(const Evidence& evidence, FittedMachine& m) {
   });
 }
 
-constexpr int kGlance = 4;        ///< iterations to see what a candidate is worth
-constexpr double kClearLoss = 4;  ///< times the least gain: no need to look closer
-constexpr std::size_t kRivals = 4;
+constexpr double kBelowNoise = 0.9;  ///< of the noise: what is left is nothing
+constexpr int kGlance = 4;           ///< iterations to see what a candidate is worth
+constexpr double kClearLoss = 4;     ///< times the least gain: no need to look closer
+constexpr std::size_t kFinalists = 3, kRivals = 4;
 
 /// What a candidate came to.
 struct Contender {
@@ -96,7 +97,8 @@ class Search {
     result_.base = fit_declared(evidence_, declared_);
     FittedMachine& now = result_.found = result_.base;
     simulate();
-    while (now.added.size() + now.released.size() < options_.max_effects && going_) {
+    while (now.added.size() + now.released.size() < options_.max_effects && going_ &&
+           now.held_out > kBelowNoise * floor_) {
       std::vector<Contender> contenders = contend(now);
       if (contenders.empty()) break;
       const std::vector<std::size_t> equivalent = equivalents(now, contenders);
@@ -249,11 +251,13 @@ class Search {
   /// Converges those contenders that may yet be the best.
   void finish(const FittedMachine& now, const LinearPart& linear, const Ground& ground,
               std::vector<Contender>& all) {
-    double best = 0;
-    for (const Contender& c : all) best = std::max(best, c.gain);
-    const double near = best - options_.class_gain - 0.3 * (excess(ground.held_out) - best);
-    for (Contender& c : all) {
-      if (!going_ || c.released.size() > 0 || c.gain < std::min(near, 0.9 * best)) continue;
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Contender& x, const Contender& y) { return x.gain > y.gain; });
+    const double best = all.empty() ? 0 : all.front().gain;
+    for (std::size_t i = 0; i < all.size() && going_; ++i) {
+      Contender& c = all[i];
+      if (i >= kFinalists && c.gain < best - options_.class_gain) break;
+      if (c.gain < 0.5 * best) break;
       c.fit = refit(evidence_, now.machine, c.numbers, without(linear, c.numbers));
       c.numbers = c.fit.live;
       c.gain = ground.held_out - c.fit.held_out;
@@ -383,6 +387,7 @@ class Search {
       m.added.push_back(std::move(added));
     }
     m.machine = best.fit.machine;
+    m.held_out = best.fit.held_out;
     // Numbers that other ones replace are no nuisances any more; fixed shapes stay as tried.
     m.nuisances = without(m.nuisances, best.numbers);
     adopt(m.nuisances.numbers, best.fit.linear);
@@ -520,7 +525,7 @@ LinearPart FittedMachine::linear() const {
 
 void converge(const Evidence& evidence, FittedMachine& m) {
   constexpr int kRounds = 3;
-  double before = std::numeric_limits<double>::infinity();
+  double before = m.held_out;
   for (int round = 0; round < kRounds; ++round) {
     const std::vector<FreedNumber> live = m.numbers();
     const Refit f = refit(evidence, m.machine, live, without(m.nuisances, live), 8);

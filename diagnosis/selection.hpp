@@ -18,6 +18,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -62,8 +63,9 @@ struct FittedMachine {
   std::vector<std::string> released;  ///< declared numbers found out of tolerance
   Prediction prediction;
   Column residual;
-  std::vector<Column> columns;      ///< of all numbers of `added`, in order
-  double fitted = 0, held_out = 0;  ///< chi-square with priors
+  std::vector<Column> columns;  ///< of all numbers of `added`, in order
+  double fitted = 0;            ///< chi-square with priors
+  double held_out = std::numeric_limits<double>::infinity();
 
   std::vector<FreedNumber> numbers() const;  ///< of all added effects
   /// Nuisances and added effects with their columns.
