@@ -94,7 +94,7 @@ class Report {
         evidence_(evidence),
         options_(options),
         selection_(std::move(selection)),
-        floor_(evidence.count(Role::held_out)) {
+        floor_(selection_.floor) {
     d_.differential = differential;
     d_.declared = of.declared;
     d_.found = selection_.found.machine;
@@ -288,10 +288,10 @@ class Report {
     std::vector<double> rms;
     for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
       rms.push_back(evidence_.rms(selection_.base.prediction, c, Role::held_out));
-    d_.ladder.push_back({"declared", selection_.base.held_out / floor_, rms});
+    d_.ladder.push_back({"declared", selection_.base.held_out / std::max(1.0, floor_), rms});
     for (std::size_t i = 0; i < selection_.rung_chi2.size(); ++i)
-      d_.ladder.push_back(
-          {selection_.rung_name[i], selection_.rung_chi2[i] / floor_, selection_.rung_rms[i]});
+      d_.ladder.push_back({selection_.rung_name[i], selection_.rung_chi2[i] / std::max(1.0, floor_),
+                           selection_.rung_rms[i]});
   }
 
   void judge() {
@@ -304,7 +304,7 @@ class Report {
     const bool excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),
                                      [](const Excitation& e) { return e.excited; });
     using enum DiagnosisVerdict;
-    if (floor_ < 200 || (!excited && !named && ratio < kQuiet))
+    if (evidence_.count(Role::held_out) < 200 || (!excited && !named && ratio < kQuiet))
       d_.verdict = not_identifiable;
     else if (d_.law)
       d_.verdict = named ? partly : unexplained;

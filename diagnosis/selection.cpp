@@ -67,7 +67,6 @@ void linearise_nuisances(const Evidence& evidence, FittedMachine& m) {
   });
 }
 
-constexpr double kBelowNoise = 0.9;  ///< of the noise: what is left is nothing
 constexpr int kGlance = 4;           ///< iterations to see what a candidate is worth
 constexpr double kClearLoss = 4;     ///< times the least gain: no need to look closer
 constexpr std::size_t kFinalists = 3, kRivals = 4;
@@ -89,16 +88,15 @@ class Search {
         declared_(declared),
         candidates_(candidates),
         options_(options),
-        keep_going_(keep_going),
-        floor_(evidence.count(Role::held_out)) {}
+        keep_going_(keep_going) {}
 
   SelectionResult run() {
     go("fitting the declared machine", 0);
     result_.base = fit_declared(evidence_, declared_);
+    floor_ = result_.floor = noise_floor(evidence_, result_.base.residual);
     FittedMachine& now = result_.found = result_.base;
     simulate();
-    while (now.added.size() + now.released.size() < options_.max_effects && going_ &&
-           now.held_out > kBelowNoise * floor_) {
+    while (now.added.size() + now.released.size() < options_.max_effects && going_) {
       std::vector<Contender> contenders = contend(now);
       if (contenders.empty()) break;
       const std::vector<std::size_t> equivalent = equivalents(now, contenders);
@@ -499,7 +497,7 @@ class Search {
   const std::vector<Candidate>& candidates_;
   const DiagnosisOptions& options_;
   const KeepGoing& keep_going_;
-  const double floor_;
+  double floor_ = 0;
   SelectionResult result_;
   std::mutex guard_;
   bool going_ = true;
@@ -559,6 +557,13 @@ FittedMachine fit_declared(Evidence& evidence, const Machine& declared) {
     converge(evidence, m);
   }
   return m;
+}
+
+double noise_floor(const Evidence& evidence, const Column& residual) {
+  double floor = 0;
+  for (std::size_t c = 0; c < residual.size(); ++c)
+    floor += std::min(evidence.count(c, Role::held_out), evidence.chi2(residual, c, Role::held_out));
+  return floor;
 }
 
 SelectionResult select_effects_of(Evidence& evidence, const Machine& declared,

@@ -74,6 +74,7 @@ struct FittedMachine {
 
 struct SelectionResult {
   FittedMachine base, found;
+  double floor = 0;  ///< what noise leaves of held-out chi-square
   std::vector<double> rung_chi2;  ///< held-out chi-square after each addition
   std::vector<std::string> rung_name;
   std::vector<std::vector<double>> rung_rms;  ///< held-out, per channel
@@ -87,6 +88,9 @@ SelectionResult select_effects_of(Evidence& evidence, const Machine& declared,
 
 /// Fits all numbers of a machine together, nuisances included, until nothing moves.
 void converge(const Evidence& evidence, FittedMachine& machine);
+
+/// Held-out chi-square that noise makes: one per sample, less where a channel is quieter than that.
+double noise_floor(const Evidence& evidence, const Column& residual);
 
 /// The declared machine with its nuisances fitted.
 FittedMachine fit_declared(Evidence& evidence, const Machine& declared);
