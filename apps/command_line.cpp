@@ -53,6 +53,11 @@ std::uint64_t parse_seed(const std::string& text) {
   return seed;
 }
 
+void add_dialect(CLI::App& command, std::string& dialect) {
+  command.add_option("--dialect", dialect, "auto (default), ngc, fanuc or siemens")
+      ->check(CLI::IsMember({"auto", "ngc", "fanuc", "siemens"}));
+}
+
 /// What run, plan and check say about a program.
 void add_program_options(CLI::App& command, ProgramChoice& how) {
   command.add_flag("--block-delete", how.block_delete, "skip lines that begin with /");
@@ -67,6 +72,7 @@ void add_program_options(CLI::App& command, ProgramChoice& how) {
   command.add_option("--tools", how.tools, "tool table of LinuxCNC, instead of the machine's");
   command.add_option("--tools-unit", how.tools_unit, "unit of its numbers: mm (default) or inch")
       ->check(CLI::IsMember({"mm", "inch"}));
+  add_dialect(command, how.dialect);
 }
 
 void add_run(CLI::App& app, int& code) {
@@ -339,8 +345,7 @@ void add_interpret(CLI::App& app, int& code) {
   interpret->add_option("--tools", o->tools, "tool table of LinuxCNC, instead of the machine's");
   interpret->add_option("--tools-unit", o->tools_unit, "unit of its numbers: mm (default) or inch")
       ->check(CLI::IsMember({"mm", "inch"}));
-  interpret->add_option("--dialect", o->dialect, "auto (default), ngc, fanuc or siemens")
-      ->check(CLI::IsMember({"auto", "ngc", "fanuc", "siemens"}));
+  add_dialect(*interpret, o->dialect);
   interpret
       ->add_option("--program-path", o->program_path,
                    "a folder of subprograms, searched after the program's own")

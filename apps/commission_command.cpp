@@ -10,10 +10,11 @@
 #include "apps/progress_line.hpp"
 #include "apps/stop_signal.hpp"
 #include "configs/config.hpp"
-#include "diagnosis/any_record.hpp"
+#include "diagnosis/commission.hpp"
 #include "diagnosis/diagnose.hpp"
-#include "diagnosis/diagnosis_text.hpp"
-#include "diagnosis/machine_replica.hpp"
+#include "diagnosis/records/any_record.hpp"
+#include "diagnosis/replica/machine_replica.hpp"
+#include "diagnosis/report/diagnosis_text.hpp"
 
 namespace vcnc {
 

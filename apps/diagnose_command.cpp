@@ -12,13 +12,14 @@
 #include "apps/progress_line.hpp"
 #include "apps/stop_signal.hpp"
 #include "configs/config.hpp"
-#include "diagnosis/any_record.hpp"
 #include "diagnosis/diagnose.hpp"
-#include "diagnosis/diagnosis_json.hpp"
-#include "diagnosis/diagnosis_page.hpp"
-#include "diagnosis/diagnosis_text.hpp"
-#include "diagnosis/machine_replica.hpp"
 #include "diagnosis/quadrature.hpp"
+#include "diagnosis/records/any_record.hpp"
+#include "diagnosis/replica/machine_replica.hpp"
+#include "diagnosis/report/diagnosis_json.hpp"
+#include "diagnosis/report/diagnosis_page.hpp"
+#include "diagnosis/report/diagnosis_text.hpp"
+#include "diagnosis/search/differential.hpp"
 
 namespace vcnc {
 
@@ -72,8 +73,10 @@ std::vector<Candidate> candidates_without(const Machine& declared,
   return all;
 }
 
+/// `seen` becomes what the diagnosis was made on: in differential mode the record less the healthy
+/// run.
 Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
-                           MachineReplica& replica, const Machine& declared) {
+                           MachineReplica& replica, const Machine& declared, Record& seen) {
   std::optional<Record> reference;
   std::unique_ptr<MachineReplica> replica_of_reference;
   std::optional<HealthyRun> healthy;
@@ -81,6 +84,7 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
     reference = load_record(options.reference, options.map);
     replica_of_reference = replica_of(*reference, declared);
     healthy.emplace(HealthyRun{*reference, *replica_of_reference});
+    seen = less_healthy(record, *reference, *replica_of_reference, declared).record;
   }
   ProgressLine progress;
   const auto keep_going = [&](const DiagnosisProgress& p) {
@@ -109,15 +113,16 @@ int diagnose_command(const DiagnoseOptions& options) {
   std::filesystem::path folder;
   if (!options.out.empty()) folder = page_folder(options.out, page, kDiagnosisMark);
   const auto replica = bare ? nullptr : replica_of(record, declared);
+  Record seen = record;
   const Diagnosis d = bare ? diagnose_quadrature(record, declared)
-                           : diagnose_machine(options, record, *replica, declared);
+                           : diagnose_machine(options, record, *replica, declared, seen);
   std::cout << to_text(d);
   const int code = stop_requested() ? kExitInterrupted : kExitOk;
   if (folder.empty()) return code;
-  DiagnosisStory story{.diagnosis = d, .record = record, .residuals = {}};
-  if (replica) story.residuals = model_residuals(record, *replica, d.declared, d.found);
+  DiagnosisStory story{.diagnosis = d, .record = seen, .residuals = {}};
+  if (replica) story.residuals = model_residuals(seen, *replica, d.declared, d.found);
   write_whole_file(folder / "diagnosis.json", to_json(d, record.source));
-  write_whole_file(folder / "found.toml", to_toml(d.found));
+  write_whole_file(folder / "found.toml", to_toml(as_hypothesis(d.declared, d.found)));
   write_whole_file(folder / page, diagnosis_page(story));
   std::cout << "model:  " << (folder / "found.toml").string() << '\n'
             << "report: " << (folder / page).string() << '\n';

@@ -4,8 +4,8 @@
 #include <iostream>
 
 #include "configs/import_map.hpp"
-#include "diagnosis/import_table.hpp"
-#include "diagnosis/record_file.hpp"
+#include "diagnosis/records/import_table.hpp"
+#include "diagnosis/records/record_file.hpp"
 
 namespace vcnc {
 

@@ -15,12 +15,8 @@ namespace vcnc {
 namespace {
 
 InterpreterOptions interpreter_options(const InterpretOptions& options) {
-  using Dialect = InterpreterOptions::Dialect;
   InterpreterOptions result;
-  result.dialect = options.dialect == "ngc"       ? Dialect::ngc
-                   : options.dialect == "fanuc"   ? Dialect::fanuc
-                   : options.dialect == "siemens" ? Dialect::siemens
-                                                  : Dialect::automatic;
+  result.dialect = dialect_of(options.dialect);
   if (!options.tools.empty()) result.tools = read_tools(options.tools, options.tools_unit);
   result.block_delete = options.block_delete;
   result.bare = options.machine.empty();
@@ -56,8 +52,10 @@ int interpret_command(const InterpretOptions& options) {
     return kExitFailure;
   }
   writer.end("");
-  if (file && std::fclose(file.release()) != 0)
-    throw InputError(options.json + ": cannot be written");
+  const bool failed = std::ferror(file ? file.get() : stdout) != 0;
+  if (failed || (file && std::fclose(file.release()) != 0))
+    throw InputError((options.json.empty() ? std::string("the terminal") : options.json) +
+                     ": cannot be written");
   return kExitOk;
 }
 

@@ -17,6 +17,8 @@ NcRecord identity_of(const Machine& machine, const std::string& piece_toml,
   if (in.bad() || !in.is_open()) throw InputError(program + ": cannot be read");
   if (options.from_line > 0) text += fmt::format("\nfrom line {}", options.from_line);
   if (options.interpreter.block_delete) text += "\nblock delete";
+  if (options.interpreter.dialect != InterpreterOptions::Dialect::automatic)
+    text += fmt::format("\ndialect {}", static_cast<int>(options.interpreter.dialect));
   if (options.interpreter.tools) text += '\n' + options.interpreter.tools->to_text(1);
   Machine content = machine;
   content.setup.piece.clear();  // its place does not matter, what it says does

@@ -23,6 +23,7 @@ NodeOptions parse_node_options(int argc, char** argv, const char* description, c
     app.add_option("--operate", o.operations, "what the operator does, e.g. \"at 3.2 s feed 50 %\"")
         ->allow_extra_args(false);
     app.add_flag("--block-delete", o.block_delete, "skip lines that begin with /");
+    app.add_option("--dialect", o.dialect, "auto, ngc, fanuc or siemens");
     app.add_option("--from-line", o.from_line, "the program begins there");
     app.add_option("--tools", o.tools, "tool table of LinuxCNC");
     app.add_option("--tools-unit", o.tools_unit, "mm or inch");

@@ -27,6 +27,7 @@ struct NodeOptions {
   bool resume = false;                   ///< NC unit: the program that was interrupted
   std::vector<std::string> operations;   ///< NC unit: in the text form of controller/operation.hpp
   bool block_delete = false;             ///< NC unit
+  std::string dialect = "auto";          ///< NC unit: of the program
   int from_line = 0;                     ///< NC unit: the program begins there
   std::string tools, tools_unit = "mm";  ///< NC unit: tool table of LinuxCNC
   int control_fd = -1;

@@ -156,6 +156,12 @@ void PathWriter::add(const Block& block) {
     text(kSpindle[static_cast<std::size_t>(spindle->mode)]);
     text("\", \"rpm\": ");
     number(spindle->speed / unit::rpm.to_si);
+    if (spindle->surface) {
+      text(", \"surface_m_min\": ");
+      number(spindle->surface->speed * 60);
+      text(", \"max_rpm\": ");
+      number(spindle->surface->most / unit::rpm.to_si);
+    }
     text("}");
   } else if (const ProgramStop* stop = std::get_if<ProgramStop>(&block)) {
     begin("stop", stop->line);

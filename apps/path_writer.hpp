@@ -6,7 +6,8 @@
 //      "centre": {"X": .., "Y": .., "Z": ..}, "plane": 17, "turns": ..,            arcs
 //      "feed": .., "feed_mode": "per_minute" | "rotary_per_minute" | "inverse_time" | "per_turn"},
 //     {"type": "dwell", "line": .., "seconds": ..},
-//     {"type": "spindle", "line": .., "mode": "off" | "cw" | "ccw" | "orient", "rpm": ..},
+//     {"type": "spindle", "line": .., "mode": "off" | "cw" | "ccw" | "orient", "rpm": ..,
+//      "surface_m_min": .., "max_rpm": ..},                G96: rpm is that of this place
 //     {"type": "stop", "line": .., "optional": ..}],
 //    "refused": "FILE:LINE:COLUMN: reason" or null}
 //

@@ -52,6 +52,14 @@ Machine with_program_path(Machine machine, const std::vector<std::string>& folde
   return machine;
 }
 
+InterpreterOptions::Dialect dialect_of(const std::string& name) {
+  using Dialect = InterpreterOptions::Dialect;
+  return name == "ngc"       ? Dialect::ngc
+         : name == "fanuc"   ? Dialect::fanuc
+         : name == "siemens" ? Dialect::siemens
+                             : Dialect::automatic;
+}
+
 ToolTable read_tools(const std::string& path, const std::string& unit) {
   return ToolTable::read(path, unit == "inch" ? 25.4e-3 : 1e-3);
 }
@@ -66,6 +74,7 @@ PlayerOptions player_options(const ProgramChoice& options, const std::string& pr
                          ? options.from_line
                          : line_of_block(program, block_number(options.from_block));
   player.interpreter.block_delete = options.block_delete;
+  player.interpreter.dialect = dialect_of(options.dialect);
   player.interpreter.data = kept_data(options.memory, options.resumed);
   if (!options.tools.empty())
     player.interpreter.tools = read_tools(options.tools, options.tools_unit);
@@ -78,6 +87,7 @@ PlayerOptions player_options(const NodeOptions& options) {
   how.tools_unit = options.tools_unit;
   how.from_line = options.from_line;
   how.block_delete = options.block_delete;
+  how.dialect = options.dialect;
   return player_options(how, options.program);
 }
 

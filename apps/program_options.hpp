@@ -17,6 +17,7 @@ struct ProgramChoice {
   std::string from_block;                 ///< N word, "N40" or "40"
   int from_line = 0;
   bool block_delete = false;
+  std::string dialect = "auto";
   std::string memory;    ///< folder of what the machine keeps; empty or not there yet: nothing
   bool resumed = false;  ///< what it kept when the interrupted program began
 };
@@ -29,6 +30,9 @@ PlayerOptions player_options(const ProgramChoice& options, const std::string& pr
 
 /// As the command line of the NC unit says it.
 PlayerOptions player_options(const NodeOptions& options);
+
+/// "auto", "ngc", "fanuc" or "siemens".
+InterpreterOptions::Dialect dialect_of(const std::string& name);
 
 /// Tool table of a file in "mm" or "inch". Throws InputError.
 ToolTable read_tools(const std::string& path, const std::string& unit);

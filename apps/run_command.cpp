@@ -373,6 +373,7 @@ int run_processes(const RunOptions& options, const BusFaults& faults, const RunF
   if (start.folder) mains = with(mains, {"--memory", start.folder->path()});
   if (options.resume) mains.push_back("--resume");
   if (options.how.block_delete) mains.push_back("--block-delete");
+  if (options.how.dialect != "auto") mains = with(mains, {"--dialect", options.how.dialect});
   if (options.how.from_line > 0)
     mains = with(mains, {"--from-line", std::to_string(options.how.from_line)});
   if (!options.how.tools.empty())

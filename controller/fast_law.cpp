@@ -21,23 +21,31 @@ constexpr int kMostRepairs = 40;
 constexpr double kFirmer = 0.002;       ///< by which each repair lowers a limit more than the last
 constexpr double kAround = 0.12;        ///< of an excess: the stretch that a repair may change [s]
 constexpr double kTableStep = 0.25e-3;  ///< of the speed law [s]
-constexpr double kSampleStep = 1e-3;    ///< of the motion that is warped [s]
-/// Cycles per step of the grid, and how close to the optimum.
+constexpr double kSampleStep = 1e-3;    ///< of the differences that the warp is found from [s]
+/// Samples in each of these, on grids no finer than kSampleStep: to see all phases.
+constexpr double kBetween = 2;
 struct Round {
-  std::size_t cycles;
-  double accuracy;
+  double step;      ///< of the grid [s]
+  double accuracy;  ///< how close to the optimum
 };
-constexpr std::array<Round, 3> kRounds{{{4, 1e-3}, {3, 3e-4}, {1, 1e-4}}};
-constexpr std::size_t kBetween = 2;  ///< samples in each of these, to see all phases
+constexpr std::array<Round, 3> kRounds{{{4e-3, 1e-3}, {2e-3, 3e-4}, {1e-3, 1e-4}}};
+constexpr Round kLastRound{0.5e-3, 1e-4};
+constexpr int kMostLastRounds = 8;
+constexpr double kLeastGain = 2e-3;  ///< in time; less ends the rounds
+/// What a round leaves alone next to an end that is not at rest, more than the one before [s]: what
+/// is not as it should be where the change begins, would grow from round to round.
+constexpr double kInset = 0.012;
+/// What nothing changes next to such an end: no difference of the third order sees two spans [s].
+constexpr double kGap = 4 * kCycle;
 constexpr double kRepairAccuracy = 1e-6;
 constexpr std::size_t kFewestNodes = 48;
 constexpr std::size_t kStretch = 400;  ///< grid points that are warped at once
 constexpr double kFree = 1e8;          ///< c where nothing limits the speed
 constexpr double kAtFeed = 2e-3;       ///< of c: there is nothing to gain
 constexpr std::size_t kPlateau = 40;   ///< grid points at the feed that are left alone
-constexpr double kNearFeed = 1e-3;     ///< of the feed: less is set right
+constexpr double kNearFeed = 2e-3;     ///< of the feed: less is set right
 constexpr double kConstant = 1e-5;     ///< what a constant feed may vary by
-constexpr double kOntoFeed = 0.01;     ///< time in which the law goes over to the feed [s]
+constexpr double kOntoFeed = 0.02;     ///< time in which the law goes over to the feed [s]
 
 std::size_t steps_of(double duration, double step) {
   return std::max(kFewestNodes, static_cast<std::size_t>(std::ceil(duration / step)));
@@ -81,16 +89,16 @@ void add_parts(const std::vector<WarpNode>& nodes, std::size_t begin, std::size_
   }
 }
 
-/// All but the places where the motion is as fast as it may be already.
-std::vector<Stretch> stretches_of(const std::vector<WarpNode>& nodes) {
+/// All between two grid points but the places where the motion is as fast as it may be already.
+std::vector<Stretch> stretches_of(const std::vector<WarpNode>& nodes, std::size_t first,
+                                  std::size_t last) {
   constexpr std::size_t kShortest = 8;
   std::vector<Stretch> result;
-  const std::size_t last = nodes.size() - 1;
   const auto done = [&](std::size_t i) {
     return nodes[i].c_max <= 1 + kAtFeed && nodes[i].use() <= 1;
   };
-  std::size_t begin = 0;
-  for (std::size_t i = 0; i <= last;) {
+  std::size_t begin = first;
+  for (std::size_t i = first; i <= last;) {
     std::size_t next = i;
     while (next <= last && done(next)) ++next;
     if (next - i >= kPlateau || next > last) {
@@ -145,15 +153,41 @@ struct FastLaw::Warp {
   std::vector<Part> parts;  ///< in order
 };
 
+double FastLaw::worst(const std::vector<Excess>& excess) {
+  double ratio = 0;
+  for (const Excess& e : excess) ratio = std::max(ratio, e.ratio);
+  return ratio;
+}
+
 FastLaw::FastLaw(const RunLimits& run, const SpeedLaw& base, const LawSpan& span)
     : run_(&run), base_(&base), span_(span), law_(table_of_base()) {
   for (const double margin : kMargins) {
-    for (const Round& round : kRounds) warp_fastest(round.cycles, round.accuracy, margin);
+    warp_in_rounds(margin);
     keep_feed();
     if (repair()) return;
     law_ = table_of_base();
   }
   given_up_ = true;
+  // The base law keeps the limits at cycles of its own; here it may not.
+  if (!repair()) {
+    const double left = worst(at_cycles());
+    SpeedTable repaired = std::exchange(law_, table_of_base());
+    if (left < worst(at_cycles())) law_ = std::move(repaired);
+  }
+}
+
+void FastLaw::warp_in_rounds(double margin) {
+  double inset = kGap;
+  for (const Round& round : kRounds) {
+    warp_fastest(round.step, round.accuracy, margin, inset);
+    inset += kInset;
+  }
+  for (int i = 0; i < kMostLastRounds; ++i) {
+    const double before = law_.duration();
+    warp_fastest(kLastRound.step, kLastRound.accuracy, margin, inset);
+    if (before - law_.duration() < kLeastGain * before) break;
+    inset += kInset;
+  }
 }
 
 SpeedTable FastLaw::table_of_base() const {
@@ -265,14 +299,22 @@ std::vector<WarpNode> FastLaw::warp_nodes(const Motion& motion, double margin) c
   return nodes;
 }
 
-void FastLaw::warp_fastest(std::size_t cycles, double accuracy, double margin) {
+void FastLaw::warp_fastest(double step, double accuracy, double margin, double inset) {
   const double duration = law_.duration();
-  const std::size_t count = steps_of(duration, static_cast<double>(cycles) * kSampleStep);
-  const Motion now =
-      motion(0, duration / static_cast<double>(count), count, cycles * kBetween, kBetween);
+  const std::size_t count = steps_of(duration, step);
+  const double span = kBetween * std::max(1.0, kSampleStep / step);
+  const Motion now = motion(0, duration / static_cast<double>(count), count,
+                            static_cast<std::size_t>(std::lround(span * step / kSampleStep)),
+                            static_cast<std::size_t>(std::lround(span)));
   const std::vector<WarpNode> nodes = warp_nodes(now, margin);
+  const auto held = static_cast<std::size_t>(std::ceil(inset / now.step()));
+  // The finest grid would put a jerk into the last cycle that only the rest after it hides.
+  const std::size_t at_rest = step < kSampleStep ? static_cast<std::size_t>(kInset / step) : 0;
+  const std::size_t first = span_.from_rest ? at_rest : held,
+                    behind = span_.to_rest ? at_rest : held;
+  if (first + behind >= count) return;
   Warp warp;
-  for (const auto& [begin, end] : stretches_of(nodes)) {
+  for (const auto& [begin, end] : stretches_of(nodes, first, count - behind)) {
     const bool hold_start = begin > 0 || !span_.from_rest;
     const bool hold_end = end < count || !span_.to_rest;
     const std::vector<WarpNode> stretch(nodes.begin() + static_cast<std::ptrdiff_t>(begin),
@@ -425,10 +467,12 @@ std::vector<FastLaw::Excess> FastLaw::at_cycles() const {
 
 /// Warps the motion around each excess; the parts are held at both ends where it goes on.
 FastLaw::Warp FastLaw::warp_nearest(const std::vector<Excess>& excess, int firmness) {
-  const double end = law_.duration();
+  const double earliest = span_.from_rest ? 0 : kGap;
+  const double end = law_.duration() - (span_.to_rest ? 0 : kGap);
   std::vector<std::pair<double, double>> windows;  // a whole number of cycles long
   for (const Excess& e : excess) {
-    const double from = std::max(0.0, e.t0 - kAround), to = std::min(end, e.t1 + kAround);
+    const double from = std::max(earliest, e.t0 - kAround), to = std::min(end, e.t1 + kAround);
+    if (from >= to) continue;
     if (!windows.empty() && from <= windows.back().second)
       windows.back().second = std::max(windows.back().second, to);
     else

@@ -1,6 +1,7 @@
 // What a program asks for, as typed blocks: moves, dwells, spindle words, stops, the end.
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <variant>
 
@@ -82,11 +83,24 @@ struct Dwell {
   int line = 0;
 };
 
+/// G96: the spindle turns as fast as its surface at the distance of X from the axis of rotation is
+/// to pass the tool,  n = v / |x - axis|,  up to a limit.
+struct SurfaceSpeed {
+  double speed = 0;  ///< v [m/s]
+  double axis = 0;   ///< X of the frame that programs call 0 [m]
+  double most = 0;   ///< [rad/s]
+  double at(double x) const {
+    const double radius = std::abs(x - axis);
+    return radius * most > speed ? speed / radius : most;
+  }
+};
+
 struct SpindleWord {
   enum class Mode { off, clockwise, counter_clockwise, orient };
   Mode mode = Mode::off;
-  double speed = 0;  ///< [rad/s]
+  double speed = 0;  ///< [rad/s]; under G96 the one where it is said
   int line = 0;
+  std::optional<SurfaceSpeed> surface{};  ///< from here on
 };
 
 /// M0 (waits), M1 (waits where the switch for it is on) and M6, all with the axes at rest.

@@ -231,6 +231,45 @@ void add_chords(const Move& arc, double sagitta, std::vector<Move>& moves) {
   }
 }
 
+/// A feed per turn while the spindle's speed follows the surface (G96), as pieces along which that
+/// speed changes by at most kSpeedStep.
+void add_by_turns(const Move& move, const SurfaceSpeed& surface, std::vector<Move>& moves) {
+  constexpr double kSpeedStep = 0.02;
+  constexpr int kFirst = 8, kMostHalvings = 10;
+  const PathSegment segment = make_segment(move, 0);
+  const auto point = [&](double share) {
+    return share == 1 ? move.end : programmed_point(segment, segment.length * share).x;
+  };
+  Move piece = move;
+  const auto add = [&](const auto& self, double from, double to, int halvings) -> void {
+    const Coordinates end = point(to);
+    const double middle = 0.5 * (from + to);
+    const double speeds[] = {surface.at(piece.start[kX]), surface.at(point(middle)[kX]),
+                             surface.at(end[kX])};
+    const auto [least, most] = std::minmax_element(std::begin(speeds), std::end(speeds));
+    if (halvings<kMostHalvings&& * most> * least * (1 + kSpeedStep)) {
+      self(self, from, middle, halvings + 1);
+      self(self, middle, to, halvings + 1);
+      return;
+    }
+    piece.end = end;
+    piece.arc.sweep = move.arc.sweep * (to - from);
+    piece.feed = move.feed_per_turn * speeds[1] / (2 * kPi);
+    moves.push_back(piece);
+    piece.start = end;
+  };
+  // An axis of rotation between the ends is not to be missed.
+  const int first = move.kind == Move::Kind::arc ? kFirst : 1;
+  const double zero = (surface.axis - move.start[kX]) / (move.end[kX] - move.start[kX]);
+  if (first == 1 && zero > 0 && zero < 1) {
+    add(add, 0, zero, 0);
+    add(add, zero, 1, 0);
+    return;
+  }
+  for (int i = 0; i < first; ++i)
+    add(add, static_cast<double>(i) / first, static_cast<double>(i + 1) / first, 0);
+}
+
 /// From where the axes are switched on to where a program begins in its middle.
 std::deque<Block> approach_to(const BlockStart& start, const Machine& machine) {
   const Kinematics kinematics(machine.kinematics, 0, Vec3::Zero());
@@ -305,9 +344,10 @@ struct Player::State {
   GcodeInterpreter program;
   PlanPort::Signal<double> allowed;
   std::optional<BlockStart> begins_at;
-  std::deque<Block> approach;    ///< to it, still to be played
-  std::optional<Block> pending;  ///< read, not yet played
-  std::optional<Move> last;      ///< taken into the run
+  std::deque<Block> approach;           ///< to it, still to be played
+  std::optional<Block> pending;         ///< read, not yet played
+  std::optional<Move> last;             ///< taken into the run
+  std::optional<SurfaceSpeed> surface;  ///< G96
   std::optional<Trajectory> run;
   double ahead = 0;            ///< how much of its path has to be known [s]
   Tick cycle = 0, cycles = 0;  ///< within the run or the dwell
@@ -426,6 +466,11 @@ struct Player::State {
     step.line = sample.line;
     step.feed = sample.tip_speed * share;
     for (std::size_t i = 0; i < kAxisCount; ++i) step.velocity[i] = sample.dq[i] * share;
+    turn_spindle();
+  }
+
+  void turn_spindle() {
+    if (surface) step.spindle_speed = surface->at(step.tip.x());
   }
 
   void brake() {
@@ -458,6 +503,7 @@ struct Player::State {
     step.tip = sample.tip;
     step.feed = sample.tip_speed;
     step.line = sample.line;
+    turn_spindle();
     if (cycle >= cycles) end_run();
   }
 
@@ -666,7 +712,10 @@ struct Player::State {
       time += seconds_of(*next);
       nodes += nodes_of(*next);
       last = *next;
-      batch.moves.push_back(std::move(*next));
+      if (surface && next->feed_per_turn > 0 && next->feed_mode == Move::Feed::tip)
+        add_by_turns(*next, *surface, batch.moves);
+      else
+        batch.moves.push_back(std::move(*next));
       pending.reset();
       batch.open = batch.moves.size() >= kMostMoves || way >= kLongestWay ||
                    time >= kLongestSeconds || nodes >= kMostNodes;
@@ -741,6 +790,7 @@ struct Player::State {
         break;
     }
     step.spindle_speed = word.speed;
+    surface = word.surface;
     begin_wait(change / machine.spindle.acceleration +
                (word.mode == Mode::orient ? kOrientSeconds : 0));
   }

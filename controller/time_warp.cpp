@@ -36,7 +36,7 @@ bool moves(const WarpNode& node, Eigen::Index axis) {
 
 /// Widens the limits to what c = 1 needs: next to a held end c cannot do much about it.
 void ease(WarpNode& node) {
-  constexpr double kRoom = 1.02;
+  constexpr double kRoom = 1.0005;
   node.c_max = std::max(node.c_max, kRoom);
   const auto largest = [](const Coordinates& low, const Coordinates& high) {
     return std::max({1.0, -kRoom * low.minCoeff(), kRoom * high.maxCoeff()});

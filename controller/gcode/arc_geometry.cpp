@@ -54,4 +54,18 @@ PlanarArc arc_of_radius(const Vec2& start, const Vec2& end, double radius, bool 
   return arc_about(start, end, centre, clockwise, turns);
 }
 
+PlanarArc arc_through(const Vec2& start, const Vec2& via, const Vec2& end) {
+  constexpr double kFlat = 1e-9;  // sine of the angle between the chords
+  const Vec2 a = via - start, b = end - start;
+  const double doubled = a[0] * b[1] - a[1] * b[0];
+  if (a.norm() < kSamePoint || b.norm() < kSamePoint || (end - via).norm() < kSamePoint)
+    throw LineError("the three points of a circle must lie apart", 0);
+  if (std::abs(doubled) < kFlat * a.norm() * b.norm())
+    throw LineError("the three points of a circle lie on a line", 0);
+  const auto across = [](const Vec2& t) { return Vec2(t[1], -t[0]); };
+  const Vec2 centre =
+      start + (a.squaredNorm() * across(b) - b.squaredNorm() * across(a)) / (2 * doubled);
+  return arc_about(start, end, centre, doubled < 0, 1);
+}
+
 }  // namespace vcnc

@@ -3,6 +3,8 @@
 //   centre given   sweep = angle from start to end about it, in the sense of G2/G3, plus P-1 turns
 //   radius given   |R| with R > 0: up to half a turn, R < 0: more;
 //                  centre = middle of the chord +- sqrt(R^2 - (chord/2)^2) across it
+//   three points   c = s + (a^2 perp(b) - b^2 perp(a)) / (2 a x b) with a = via - s, b = end - s,
+//                  perp a quarter turn clockwise
 // Valid if the radii at start and end agree to 2 um + 0.1 %; within that the arc is a spiral.
 // Source: NIST RS274/NGC interpreter, version 3 (NISTIR 6556), 3.5.3.
 #pragma once
@@ -24,5 +26,8 @@ PlanarArc arc_about(const Vec2& start, const Vec2& end, const Vec2& centre, bool
                     int turns);
 PlanarArc arc_of_radius(const Vec2& start, const Vec2& end, double radius, bool clockwise,
                         int turns);
+
+/// From start by via to end, less than a turn. Throws LineError where they lie on a line.
+PlanarArc arc_through(const Vec2& start, const Vec2& via, const Vec2& end);
 
 }  // namespace vcnc

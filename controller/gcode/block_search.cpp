@@ -89,7 +89,10 @@ BlockStart ProgramRun::run_to(int line) {
                        : modal_.spindle == 4  ? SpindleWord::Mode::counter_clockwise
                        : modal_.spindle == 19 ? SpindleWord::Mode::orient
                                               : SpindleWord::Mode::off;
-  if (modal_.spindle == 3 || modal_.spindle == 4) start.spindle.speed = modal_.spindle_speed;
+  if (modal_.spindle == 3 || modal_.spindle == 4) {
+    start.spindle.speed = spindle_speed_at(position_[kX]);
+    start.spindle.surface = modal_.surface;
+  }
   start.tool = tool_in_spindle_;
   start.length = h_;
   start.work_offset = work_.active;

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "controller/gcode/cursor.hpp"
 
@@ -66,6 +68,7 @@ void CutterCompensation::begin(double radius, bool left, std::size_t normal) {
   u_ = static_cast<Eigen::Index>((normal + 1) % 3);
   v_ = static_cast<Eigen::Index>((normal + 2) % 3);
   held_ = false;
+  begin_anew();
 }
 
 void CutterCompensation::end() {
@@ -148,6 +151,7 @@ void CutterCompensation::add(Block block, std::vector<Block>& ready) {
     state_ = State::off;
     return;
   }
+  if (state_ == State::on) look_at_programmed(*move);
   Element next = shifted(std::move(*move));
   if (state_ == State::entry) {
     const Vec2 begin = planar(next.move.start);
@@ -183,7 +187,10 @@ void CutterCompensation::join(Element& next, std::vector<Block>& ready) {
   else
     cut(next);
   release(ready);
-  for (Move& corner : corner_) ready.emplace_back(std::move(corner));
+  for (Move& corner : corner_) {
+    watch(corner);
+    ready.emplace_back(std::move(corner));
+  }
   last_ = std::move(next);
   held_ = true;
 }
@@ -289,12 +296,158 @@ void CutterCompensation::release(std::vector<Block>& ready) {
   held_ = false;
   place(last_.move, last_.from, last_.to);
   if (last_.arc) last_.move.arc.sweep = last_.sweep;
+  if (!last_.entry) watch(last_.move);
   ready.emplace_back(last_.move);
   for (Block& block : behind_) {
-    if (Move* move = std::get_if<Move>(&block)) place(*move, last_.to, last_.to);
+    if (Move* move = std::get_if<Move>(&block)) {
+      place(*move, last_.to, last_.to);
+      begin_anew();
+    }
     ready.push_back(std::move(block));
   }
   behind_.clear();
+}
+
+void CutterCompensation::begin_anew() {
+  walls_.clear();
+  programmed_.clear();
+  crossed_ = false;
+}
+
+CutterCompensation::Way CutterCompensation::way_of(const Move& move) const {
+  Way way;
+  way.arc = move.kind == Move::Kind::arc;
+  way.from = planar(move.start);
+  way.to = planar(move.end);
+  way.line = move.line;
+  if (way.arc) {
+    way.centre = {move.arc.centre[u_], move.arc.centre[v_]};
+    way.radius = (way.to - way.centre).norm();
+    way.sweep = move.arc.sweep;
+  }
+  set_box(way);
+  return way;
+}
+
+/// Whether the program crosses itself, before compensation.
+void CutterCompensation::look_at_programmed(const Move& move) {
+  if (crossed_) return;
+  const Way way = way_of(move);
+  for (const Way& before : programmed_) {
+    if (!near(way, before)) continue;
+    std::array<Vec2, 2> points;
+    const auto end = points.begin() + crossings(way, before, points);
+    const bool neighbours = &before == &programmed_.back();
+    crossed_ = std::any_of(points.begin(), end, [&](const Vec2& p) {
+      return !neighbours || (p - way.from).norm() > kDeep;
+    });
+    if (crossed_) return;
+  }
+  keep(programmed_, way);
+}
+
+/// Refuses a move whose way enters a wall, and makes it one.
+void CutterCompensation::watch(const Move& move) {
+  const auto w = static_cast<Eigen::Index>(normal_);
+  if (move.kind == Move::Kind::rapid || move.start[w] != move.end[w]) {
+    begin_anew();
+    return;
+  }
+  if (crossed_ || std::abs(s_) <= 2 * kDeep) return;
+  const Way way = way_of(move);
+  if (way.arc && std::abs((way.from - way.centre).norm() - way.radius) > 0.5 * kDeep) {
+    begin_anew();  // a spiral
+    return;
+  }
+  for (const Way& wall : walls_)
+    if (near(way, wall) && enters(way, wall))
+      throw LineError(fmt::format("the tool would gouge: the move of line {} crosses what that of "
+                                  "line {} leaves standing",
+                                  way.line, wall.line),
+                      0);
+  keep(walls_, wall_of(way));
+}
+
+bool CutterCompensation::near(const Way& a, const Way& b) {
+  return (a.least.array() <= b.most.array()).all() && (b.least.array() <= a.most.array()).all();
+}
+
+void CutterCompensation::keep(std::vector<Way>& ways, Way way) {
+  if (ways.size() >= 2 * kWalls)
+    ways.erase(ways.begin(), ways.begin() + static_cast<std::ptrdiff_t>(kWalls));
+  ways.push_back(std::move(way));
+}
+
+void CutterCompensation::set_box(Way& way) {
+  if (way.arc) {
+    way.least = way.centre.array() - way.radius;
+    way.most = way.centre.array() + way.radius;
+  } else {
+    way.least = way.from.cwiseMin(way.to);
+    way.most = way.from.cwiseMax(way.to);
+  }
+}
+
+/// The way moved by kDeep to the side of the piece.
+CutterCompensation::Way CutterCompensation::wall_of(Way way) const {
+  const double right = std::copysign(kDeep, s_);
+  if (way.arc) {
+    const double radius = way.radius + (way.sweep > 0 ? right : -right);
+    way.from = way.centre + (way.from - way.centre) * (radius / way.radius);
+    way.to = way.centre + (way.to - way.centre) * (radius / way.radius);
+    way.radius = radius;
+  } else {
+    const Vec2 across = right * left_of((way.to - way.from).normalized());
+    way.from -= across;
+    way.to -= across;
+  }
+  set_box(way);
+  return way;
+}
+
+Vec2 CutterCompensation::direction(const Way& way, const Vec2& p) {
+  if (!way.arc) return (way.to - way.from).normalized();
+  return (way.sweep > 0 ? 1 : -1) * left_of((p - way.centre).normalized());
+}
+
+/// Where two ways meet; those that lie on each other do not.
+int CutterCompensation::crossings(const Way& way, const Way& other, std::array<Vec2, 2>& points) {
+  const auto holds = [](const Way& on, const Vec2& p) {
+    if (on.arc) {
+      const double sense = on.sweep > 0 ? 1 : -1;
+      return turn_from(on.from - on.centre, p - on.centre, sense) <= std::abs(on.sweep);
+    }
+    const Vec2 whole = on.to - on.from;
+    const double along = (p - on.from).dot(whole);
+    return along >= 0 && along <= whole.squaredNorm();
+  };
+  int count = 0;
+  if (way.arc && other.arc) {
+    count = meet_circles(way.centre, way.radius, other.centre, other.radius, points);
+  } else if (way.arc || other.arc) {
+    const Way& line = way.arc ? other : way;
+    const Way& circle = way.arc ? way : other;
+    count = meet(line.from, direction(line, line.from), circle.centre, circle.radius, points);
+  } else {
+    const Vec2 t = direction(way, way.from), along = direction(other, other.from);
+    const double sine = cross(t, along);
+    if (sine == 0) return 0;
+    points[0] = way.from + t * (cross(other.from - way.from, along) / sine);
+    count = 1;
+  }
+  const auto end = std::remove_if(points.begin(), points.begin() + count, [&](const Vec2& p) {
+    return !holds(way, p) || !holds(other, p);
+  });
+  return static_cast<int>(end - points.begin());
+}
+
+/// Whether a way crosses a wall towards the piece.
+bool CutterCompensation::enters(const Way& way, const Way& wall) const {
+  std::array<Vec2, 2> points;
+  const int count = crossings(way, wall, points);
+  return std::any_of(points.begin(), points.begin() + count, [&](const Vec2& p) {
+    return s_ * cross(direction(wall, p), direction(way, p)) < 0;
+  });
 }
 
 void CutterCompensation::flush(std::vector<Block>& ready) { release(ready); }

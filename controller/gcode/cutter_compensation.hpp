@@ -9,11 +9,17 @@
 //   arcs       keep centre and angle; radius R - s (counter-clockwise), R + s (clockwise)
 //   exit       straight from  p + s n  to the programmed end of the next move
 // A move that would have to run backwards, an arc not larger than the tool on its inside, and an
-// entry not longer than r are refused: the tool would cut into what it shall leave standing. Only
-// neighbouring moves are looked at. Each move waits for the next one in the plane.
+// entry not longer than r are refused: the tool would cut into what it shall leave standing. So is
+// a move of the centre that crosses one of the kWalls before it from the tool's side to that of the
+// piece, kDeep behind its line: a neck narrower than the tool. Entry and exit are no walls; a rapid
+// and a move along the plane's normal begin anew, since what follows may run above what stands; a
+// contour that crosses itself as it is programmed is not looked at any further. Each move waits for
+// the next one in the plane.
+//
 // Source: LinuxCNC user manual, "Cutter compensation", whose entry and exit these are.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "controller/gcode/arc_geometry.hpp"
@@ -23,7 +29,8 @@ namespace vcnc {
 
 class CutterCompensation {
  public:
-  static constexpr std::size_t kMostWaiting = 1000;
+  static constexpr std::size_t kMostWaiting = 1000, kWalls = 1000;
+  static constexpr double kDeep = 5e-6;  ///< [m]; programs round to less
 
   bool active() const { return state_ != State::off; }
   void begin(double radius, bool left, std::size_t normal);
@@ -47,6 +54,26 @@ class CutterCompensation {
     double sweep = 0, radius = 0;  ///< of the tool's centre
   };
 
+  /// The way of the tool's centre in a move; with its box, and for a circle the whole one's.
+  struct Way {
+    bool arc = false;
+    Vec2 from, to, centre;
+    double radius = 0, sweep = 0;
+    int line = 0;
+    Vec2 least, most;
+  };
+
+  Way way_of(const Move& move) const;
+  void watch(const Move& move);
+  void look_at_programmed(const Move& move);
+  void begin_anew();
+  static void set_box(Way& way);
+  static bool near(const Way& a, const Way& b);
+  static void keep(std::vector<Way>& ways, Way way);
+  static Vec2 direction(const Way& way, const Vec2& p);
+  Way wall_of(Way way) const;
+  static int crossings(const Way& way, const Way& other, std::array<Vec2, 2>& points);
+  bool enters(const Way& way, const Way& wall) const;
   Element shifted(Move move) const;
   void join(Element& next, std::vector<Block>& ready);
   void mitre(Element& next, double turn);
@@ -62,8 +89,11 @@ class CutterCompensation {
   Eigen::Index u_ = 0, v_ = 1;
   bool held_ = false;  ///< last_ waits for its successor
   Element last_;
-  std::vector<Block> behind_;  ///< follow last_, without motion in the plane
-  std::vector<Move> corner_;   ///< between last_ and the next element
+  std::vector<Block> behind_;    ///< follow last_, without motion in the plane
+  std::vector<Move> corner_;     ///< between last_ and the next element
+  std::vector<Way> walls_;       ///< moved to the side of the piece by kDeep
+  std::vector<Way> programmed_;  ///< without compensation
+  bool crossed_ = false;         ///< by the program itself
 };
 
 }  // namespace vcnc

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -149,6 +151,8 @@ std::optional<double> call(std::string_view name, double x, int column) {
   if (name == "SQRT" || name == "SQR") return need(x >= 0, "0 or more"), std::sqrt(x);
   if (name == "TAN") return std::tan(x * kDegree);
   if (name == "SGN") return x > 0 ? 1 : x < 0 ? -1 : 0;
+  if (name == "POT") return x * x;
+  if (name == "TRUNC") return std::trunc(x);
   return std::nullopt;
 }
 
@@ -177,7 +181,7 @@ double Evaluator::value(Cursor& at, int depth) const {
   if (is_digit(c) || c == '.') return at.number();
   const int column = at.column();
   if (depth > kDeepest) throw LineError("expression nested deeper than 50", column);
-  if (c == '[') return bracketed(at, depth + 1);
+  if (opens(c)) return bracketed(at, depth + 1);
   if (c == '+' || c == '-') {
     std::size_t ahead = 1;
     while (at.peek(ahead) == ' ' || at.peek(ahead) == '\t') ++ahead;
@@ -225,9 +229,13 @@ int Evaluator::parameter_number(Cursor& at, int depth) const {
 
 double Evaluator::bracketed(Cursor& at, int depth) const {
   const int column = at.column();
-  if (!at.take('[')) throw LineError("'[' is missing", column);
+  at.skip_blanks();
+  const char opened = at.peek();
+  if (!opens(opened)) throw LineError("'[' is missing", column);
+  at.advance();
   const double x = expression(at, 0, depth);
-  if (at.take(']')) return x;
+  if (at.take(opened == '[' ? ']' : ')')) return x;
+  if (opened == '(') throw LineError("'(' without its ')'", column);
   at.skip_blanks();
   const char c = at.peek();
   if (!at.at_end() && !is_letter(c) && !is_digit(c) && c > ' ' && c < 0x7f && c != ';' && c != '(')
@@ -249,6 +257,27 @@ double Evaluator::expression(Cursor& at, int lowest_rank, int depth) const {
   }
 }
 
+/// #1000 .. #1999.
+int Evaluator::r_parameter(Cursor& at, int depth) const {
+  constexpr int kFirst = 1000, kCount = 1000;
+  at.skip_blanks();
+  const int column = at.column();
+  const double x = at.peek() == '[' ? bracketed(at, depth) : at.number();
+  const int number = whole_number(set_or_zero(x));
+  if (number < 0 || number >= kCount)
+    throw LineError(
+        fmt::format("R{:g}: an R parameter has a whole number from 0 to {}", x, kCount - 1),
+        column);
+  return kFirst + number;
+}
+
+bool Evaluator::is_function(std::string_view name) {
+  constexpr std::array kNames{"ABS", "ACOS", "ASIN", "ATAN", "COS",   "EXISTS", "EXP", "FIX",
+                              "FUP", "LN",   "MAX",  "MIN",  "POW",   "ROUND",  "SGN", "SIN",
+                              "SQR", "SQRT", "TAN",  "POT",  "TRUNC", "ATAN2"};
+  return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
+}
+
 double Evaluator::exists(Cursor& at, int depth) const {
   const int column = at.column();
   if (!at.take('[') || !at.take('#'))
@@ -268,14 +297,31 @@ double Evaluator::arc_tangent(Cursor& at, int depth) const {
   return std::atan2(y, x) / kDegree;
 }
 
+/// ATAN2(y,x) of Siemens.
+double Evaluator::arc_tangent_of_two(Cursor& at, int depth) const {
+  const int column = at.column();
+  at.advance();
+  if (!at.take('(')) throw LineError("ATAN2 takes two values: (y,x)", column);
+  const double y = expression(at, 0, depth);
+  if (!at.take(',')) throw LineError("ATAN2 takes two values: (y,x)", column);
+  const double x = expression(at, 0, depth);
+  if (!at.take(')')) throw LineError("'(' without its ')'", column);
+  return std::atan2(y, x) / kDegree;
+}
+
 double Evaluator::function(Cursor& at, int depth) const {
   const int column = at.column();
   const std::string name = at.letters();
   at.advance(name.size());
+  if (siemens_ && name == "R" && (is_digit(at.peek()) || at.peek() == '[')) {
+    const double x = parameters_.read(r_parameter(at, depth));
+    return set_or_zero(x);
+  }
   at.skip_blanks();
+  if (siemens_ && name == "ATAN" && at.peek() == '2') return arc_tangent_of_two(at, depth);
   if (name == "EXISTS") return exists(at, depth);
   if (name == "ATAN") return arc_tangent(at, depth);
-  if (at.peek() == '[') {
+  if (opens(at.peek())) {
     if (name == "POW" || name == "MAX" || name == "MIN") {
       at.advance();
       const double x = set_or_zero(expression(at, 0, depth));

@@ -159,6 +159,7 @@ FlowIndex::FlowIndex(ProgramText& text) {
     const char first = upper(at.peek());
     if (!begins_flow(first)) continue;
     if (first == 'G' && upper(at.peek(1)) != 'O' && at.peek(1) != '6') continue;
+    if (at.letters().starts_with("ORI")) continue;  // of Siemens
     try {
       const std::optional<FlowLine> found =
           first == 'O' || first == ':' ? o_line(at) : macro_line(at, macros_);

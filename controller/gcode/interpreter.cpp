@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "controller/gcode/interpreter_run.hpp"
 
@@ -11,6 +12,13 @@ namespace {
 
 constexpr std::size_t kMostAssignments = 100;  ///< of one line
 constexpr double kLargestWord = 1e7;
+
+/// Main programs of Siemens are called .MPF, subprograms .SPF.
+bool named_as_siemens(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  for (char& c : ending) c = upper(c);
+  return ending == ".MPF" || ending == ".SPF";
+}
 
 }  // namespace
 
@@ -36,7 +44,7 @@ ProgramRun::ProgramRun(const std::string& path, const Machine& machine, Interpre
     : machine_(machine),
       options_(std::move(options)),
       parameters_(*this),
-      evaluator_(parameters_, fanuc_),
+      evaluator_(parameters_, fanuc_, siemens_dialect_),
       tools_(options_.tools  ? std::move(*options_.tools)
              : options_.bare ? ToolTable()
                              : ToolTable(machine)),
@@ -47,6 +55,8 @@ ProgramRun::ProgramRun(const std::string& path, const Machine& machine, Interpre
   units_.push_back(std::make_unique<Unit>(path));
   fanuc_ = options_.dialect == Dialect::fanuc ||
            (options_.dialect == Dialect::automatic && unit().flow.macros());
+  siemens_dialect_ = options_.dialect == Dialect::siemens ||
+                     (options_.dialect == Dialect::automatic && named_as_siemens(path));
   if (fanuc_) parameters_.last_local(LocalParameters::kCount);
   modal_.tolerance = machine.nc.blend_tolerance;
   modal_.dynamics = machine.nc.dynamics;
@@ -100,6 +110,10 @@ void ProgramRun::read_line() {
   assignments_.clear();
   vector_given_ = 0;
   siemens_ = 0;
+  if (siemens_dialect_) {
+    way_.fill(Way::modal);
+    via_given_ = 0;
+  }
   if (!read_words(at)) return;
   if (!assignments_.empty()) apply_assignments();
   execute();
@@ -140,6 +154,7 @@ bool ProgramRun::read_words(Cursor& at) {
         if (at.at_end()) break;
         continue;
       }
+      if (is_letter(at.peek(1))) refuse_word(at);
       read_letter(at);
     } else if (c == '(') {
       at.take_comment();
@@ -161,6 +176,13 @@ bool ProgramRun::read_words(Cursor& at) {
   return true;
 }
 
+/// Several letters that are neither a word nor a letter and a function behind it.
+void ProgramRun::refuse_word(Cursor& at) const {
+  const std::string word = at.letters();
+  if (!Evaluator::is_function(std::string_view(word).substr(1)))
+    fail(fmt::format("unknown word {}", word), at.column());
+}
+
 void ProgramRun::read_letter(Cursor& at) {
   const int column = at.column();
   const char letter = upper(at.peek());
@@ -168,9 +190,12 @@ void ProgramRun::read_letter(Cursor& at) {
   at.skip_blanks();
   const char c = at.peek();
   double value = 0;
-  if (c == '=') {  // Siemens: X=10
+  if (siemens_dialect_ && (is_digit(c) || letter == 'R') &&
+      read_siemens_address(letter, at, column)) {
+    return;
+  } else if (c == '=') {  // Siemens: X=10
     at.advance();
-    value = evaluator_.bare(at);
+    value = siemens_dialect_ ? siemens_value(letter, at) : evaluator_.bare(at);
   } else if (is_digit(c) && at.peek(1) == '=') {  // Siemens: A3=0.5
     if (c != '3' || (letter != 'A' && letter != 'B' && letter != 'C'))
       fail(fmt::format("unknown {}{}=; allowed are A3= B3= C3=", letter, c), column);
@@ -201,6 +226,7 @@ void ProgramRun::read_letter(Cursor& at) {
     if (!words_.empty()) fail("O stands at the begin of a line", column);
     return;
   }
+  if (letter == 'G' && siemens_dialect_ && !siemens_code(value)) return;
   words_.enter(letter, value, column);
 }
 
@@ -247,6 +273,8 @@ void ProgramRun::execute() {
     execute_macro_words();
     if (once == 650 || words_.code(MGroup::stop) >= 98) return;
   }
+  if (once == 50) set_high_speed();
+  if (words_.has(GGroup::diameter)) words_.use(fanuc_ ? "P" : "");
   const bool takes_axes = once == 100 || (once >= 280 && once <= 301) || once == 520 || once == 920;
   if (takes_axes && words_.has(GGroup::motion) && words_.code(GGroup::motion) != 800)
     fail(fmt::format("{} together with a motion word in one block; write them in two blocks",
@@ -256,6 +284,7 @@ void ProgramRun::execute() {
   set_feed();
   set_spindle();
   set_tool();
+  set_outputs();
   if (once == 40) emit_dwell();
   set_cutter();
   set_tool_length();

@@ -54,7 +54,9 @@ void ProgramRun::cycle_spindle(int code) {
                     : code == 4  ? Mode::counter_clockwise
                     : code == 19 ? Mode::orient
                                  : Mode::off;
-  emit(SpindleWord{mode, code == 3 || code == 4 ? modal_.spindle_speed : 0, line_number()});
+  const bool turns = code == 3 || code == 4;
+  emit(SpindleWord{mode, turns ? spindle_speed_at(position_[kX]) : 0, line_number(),
+                   turns ? modal_.surface : std::nullopt});
 }
 
 void ProgramRun::emit_cycle(int code) {
@@ -70,6 +72,8 @@ void ProgramRun::emit_cycle(int code) {
     fail(name + " without X, Y or Z", column);
   words_.use("XYZRLQP");
   if (code == 760) words_.use("IJ");
+  if (modal_.surface && (code == 740 || code == 840))
+    fail(name + " under G96; allowed is G97", column);
 
   if (words_.has('R')) cycle_.r = length('R');
   if (words_.has(letter_w)) cycle_.z = length(letter_w);

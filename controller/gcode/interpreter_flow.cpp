@@ -431,6 +431,7 @@ bool ProgramRun::read_keyword(Cursor& at) {
     return true;
   }
   if (take_dynamics(at)) return true;
+  if (siemens_dialect_ && read_siemens_word(at)) return true;
   if (at.letters() == "CR" && at.peek(2) == '=') {
     at.advance(3);
     words_.enter('R', evaluator_.bare(at), column);

@@ -1,6 +1,7 @@
 // The part of the interpreter that keeps the modes: planes, units, feeds, spindle, tools, offsets.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "controller/gcode/interpreter_run.hpp"
@@ -73,8 +74,17 @@ void ProgramRun::set_dynamics() {
   modal_.dynamics = level <= kFastLevels ? Dynamics::fast : Dynamics::smooth;
 }
 
+/// G5 P10000, G5 P0 of Fanuc: blocks are always taken this fast.
+void ProgramRun::set_high_speed() {
+  const int column = words_.column(GGroup::once);
+  if (!fanuc_) fail(fmt::format("unknown G5; allowed are {}", kKnownG), column);
+  words_.use("P");
+  if (!words_.has('P')) fail("G5 without P (10000: on, 0: off)", column);
+}
+
 void ProgramRun::set_feed() {
-  if (!words_.has('F')) {
+  const bool dwell = siemens_dialect_ && words_.code(GGroup::once) == 40;
+  if (!words_.has('F') || dwell) {
     // Inverse time holds for one block only.
     if (modal_.feed == 930) modal_.linear_feed = modal_.rotary_feed = kNoFeed;
     return;
@@ -96,36 +106,87 @@ void ProgramRun::set_feed() {
   }
 }
 
-void ProgramRun::set_spindle() {
-  if (words_.has(GGroup::spindle)) {
+void ProgramRun::check_speed(double rpm) const {
+  const double most = machine_.spindle.max_speed;
+  if (!(rpm >= 0 && (options_.bare || rpm * unit::rpm.to_si <= most * (1 + 1e-9))))
+    fail(fmt::format("S{:g} is out of range; allowed is 0 to {:.0f} rpm", rpm,
+                     most / unit::rpm.to_si),
+         words_.column('S'));
+}
+
+/// G96 S D: S in m/min or ft/min at the distance of X from the 0 of the program, at most D rpm.
+/// G97: S in rpm; without it the speed stays what it has become.
+void ProgramRun::set_surface_speed() {
+  constexpr double kFoot = 0.3048;
+  const int column = words_.column(GGroup::spindle);
+  if (words_.code(GGroup::spindle) == 970) {
+    modal_.spindle_speed = spindle_speed_at(position_[kX]);
+    modal_.surface.reset();
+    return;
+  }
+  if (words_.code(GGroup::spindle) == 960) {
     words_.use("D");
-    modal_.constant_speed = words_.code(GGroup::spindle) == 960;
-    if (modal_.constant_speed)
-      fail("G96: constant surface speed is for lathes; allowed is G97",
-           words_.column(GGroup::spindle));
+    if (!words_.has('S')) fail("G96 without S (the speed of the surface)", column);
+    if (work_.rotated()) fail("G96 while coordinates are rotated; cancel with G69", column);
+    const double most = words_.value_or('D', 0) * unit::rpm.to_si;
+    if (words_.has('D') && !(most > 0))
+      fail(fmt::format("D{:g} of G96: allowed is a speed of more than 0 rpm", words_.value('D')),
+           words_.column('D'));
+    modal_.surface.emplace();
+    modal_.surface->most = machine_.spindle.max_speed;
+    if (words_.has('D') && (options_.bare || most < modal_.surface->most))
+      modal_.surface->most = most;
+    if (modal_.speed_limit > 0)
+      modal_.surface->most = std::min(modal_.surface->most, modal_.speed_limit);
   }
-  if (words_.has('S')) {
+  words_.use("S");
+  const double speed = words_.value('S');
+  if (!(speed > 0))
+    fail(fmt::format("S{:g} under G96 must be greater than 0", speed), words_.column('S'));
+  modal_.surface->speed = speed * (modal_.length_unit == 1e-3 ? 1 : kFoot) / 60;
+  modal_.surface->axis = work_.to_frame(0, kX);
+}
+
+double ProgramRun::spindle_speed_at(double x) const {
+  return modal_.surface ? modal_.surface->at(x) : modal_.spindle_speed;
+}
+
+void ProgramRun::set_spindle() {
+  if (siemens_dialect_ && words_.code(GGroup::once) == 40) return;  // turns of G4
+  if (fanuc_ && words_.code(GGroup::once) == 920 && words_.has('S')) {
     words_.use("S");
-    const double rpm = words_.value('S');
-    modal_.spindle_speed = rpm * unit::rpm.to_si;
-    const double most = machine_.spindle.max_speed;
-    if (!(rpm >= 0 && (options_.bare || modal_.spindle_speed <= most * (1 + 1e-9))))
-      fail(fmt::format("S{:g} is out of range; allowed is 0 to {:.0f} rpm", rpm,
-                       most / unit::rpm.to_si),
-           words_.column('S'));
+    check_speed(words_.value('S'));
+    modal_.speed_limit = words_.value('S') * unit::rpm.to_si;
+    if (modal_.surface) modal_.surface->most = modal_.speed_limit;
+    return;
   }
-  if (!words_.has(MGroup::spindle)) return;
-  if (fanuc_ || words_.code(MGroup::spindle) == 19) words_.use("R");
-  const int code = words_.code(MGroup::spindle), column = words_.column(MGroup::spindle);
+  const bool by_surface = words_.has(GGroup::spindle) || (modal_.surface && words_.has('S'));
+  if (by_surface) set_surface_speed();
+  if (words_.has('S') && !modal_.surface) {
+    words_.use("S");
+    check_speed(words_.value('S'));
+    modal_.spindle_speed = words_.value('S') * unit::rpm.to_si;
+  }
+  if (words_.has(MGroup::spindle)) {
+    emit_spindle(words_.code(MGroup::spindle));
+  } else if ((words_.has('S') || by_surface) && (modal_.spindle == 3 || modal_.spindle == 4)) {
+    emit_spindle(modal_.spindle);
+  }
+}
+
+void ProgramRun::emit_spindle(int code) {
+  if (fanuc_ || code == 19) words_.use("R");
+  const int column = words_.column(MGroup::spindle);
   SpindleWord word{SpindleWord::Mode::off, 0, line_number()};
   if (code == 19) word.mode = SpindleWord::Mode::orient;
   if (code == 3 || code == 4) {
     if (machine_.probe.in_spindle && !options_.bare)
       fail(fmt::format("M{}: probe in spindle: only M19 is allowed", code), column);
-    if (!(modal_.spindle_speed > 0) && !options_.bare)
+    word.speed = spindle_speed_at(position_[kX]);
+    word.surface = modal_.surface;
+    if (!(word.speed > 0) && !options_.bare && words_.has(MGroup::spindle))
       fail(fmt::format("M{} without S", code), column);
     word.mode = code == 3 ? SpindleWord::Mode::clockwise : SpindleWord::Mode::counter_clockwise;
-    word.speed = modal_.spindle_speed;
   }
   modal_.spindle = code;
   emit(word);
@@ -147,9 +208,6 @@ void ProgramRun::set_tool() {
     tool(words_.value('T'), 'T');
     selected_tool_ = whole_number(words_.value('T'));
   }
-  const int output = words_.code(MGroup::output);
-  if (output >= 0) words_.use("PELQ");
-  if (output == 66) input_ = 0;
   const int override = words_.code(MGroup::override);
   if (override == 48 || override == 49) modal_.feed_override = override == 48;
   if (override >= 50) words_.use("P");
@@ -168,6 +226,52 @@ void ProgramRun::set_tool() {
   tool_in_spindle_ = selected_tool_;
   modal_.spindle = 5;
   emit(ProgramStop{true, line_number(), true});
+}
+
+/// M62 .. M68. Outputs act on nothing. Inputs are all off and stay so: M66 with L0 reads 0, L4
+/// (off) is met at once, every other wait ends after Q seconds with #5399 = -1.
+void ProgramRun::set_outputs() {
+  const int code = words_.code(MGroup::output);
+  if (code < 0) return;
+  constexpr int kMostPins = 64;
+  constexpr double kLongestWait = 36000;
+  const int column = words_.column(MGroup::output);
+  const auto pin = [&](char letter) {
+    words_.use(std::string_view(&letter, 1));
+    if (!words_.has(letter))
+      fail(fmt::format("M{} without {} (which input or output)", code, letter), column);
+    const int number = whole_number(words_.value(letter));
+    if (number < 0 || number >= kMostPins)
+      fail(fmt::format("{}{:g} of M{}: allowed are 0 to {}", letter, words_.value(letter), code,
+                       kMostPins - 1),
+           words_.column(letter));
+  };
+  if (code <= 65) {
+    pin('P');
+    return;
+  }
+  if (code >= 67) {
+    pin('E');
+    words_.use("Q");
+    return;
+  }
+  need_no_compensation("M66", column);
+  if (words_.has('P') == words_.has('E'))
+    fail("M66 needs P (digital input) or E (analog input), one of both", column);
+  pin(words_.has('P') ? 'P' : 'E');
+  words_.use("LQ");
+  const int how = words_.has('L') ? whole_number(words_.value('L')) : 0;
+  if (how < 0 || how > 4)
+    fail(fmt::format("L{:g} of M66: allowed are 0 to 4", words_.value('L')), words_.column('L'));
+  if (words_.has('E') && how != 0)
+    fail("M66 E with L: an analog input can only be read (L0)", words_.column('L'));
+  const double wait = words_.value_or('Q', 0);
+  if (!(wait >= 0 && wait <= kLongestWait))
+    fail("Q of M66 must be 0 to 36000 seconds", words_.column('Q'));
+  if (how > 0 && !(wait > 0)) fail("M66 that waits needs Q (seconds) greater than 0", column);
+  const bool waits = how >= 1 && how <= 3;
+  input_ = waits ? -1 : 0;
+  if (waits) emit(Dwell{wait, line_number()});
 }
 
 void ProgramRun::set_tool_length() {
@@ -221,7 +325,7 @@ void ProgramRun::set_tool_length() {
 
 void ProgramRun::set_cutter() {
   if (words_.has('D')) {
-    if (fanuc_ || options_.dialect == Dialect::siemens) {
+    if (fanuc_ || siemens_dialect_) {
       words_.use("D");
       tool(words_.value('D'), 'D');
       d_ = whole_number(words_.value('D'));
@@ -462,6 +566,7 @@ void ProgramRun::set_g92() {
       break;
   }
   words_.use(kAxisLetters);
+  if (fanuc_ && words_.has('S') && !words_.any_axis()) return;
   if (!words_.any_axis()) fail(code_name(code) + " without axis words", column);
   const Coordinates here = work_.to_words(position_);
   for (std::size_t i = 0; i < kAxisCount; ++i) {

@@ -32,7 +32,7 @@ Coordinates ProgramRun::target(bool machine_coordinates) {
       if (!words_.has(kAxisLetters[i])) continue;
       const auto row = static_cast<Eigen::Index>(i);
       const double word = in_si(i, words_.value(kAxisLetters[i]));
-      words[row] = modal_.absolute ? word : words[row] + word;
+      words[row] = absolute(kAxisLetters[i]) ? word : words[row] + word;
     }
     return work_.to_frame(words);
   }
@@ -43,10 +43,12 @@ Coordinates ProgramRun::target(bool machine_coordinates) {
     const double word = in_si(i, words_.value(letter));
     if (machine_coordinates)
       end[row] = word;
-    else if (modal_.absolute)
+    else if (absolute(letter))
       end[row] = work_.to_frame(word, row);
     else
       end[row] += word;
+    if (const Way way = way_[static_cast<std::size_t>(letter - 'A')]; way >= Way::shortest)
+      end[row] = turned(end[row], position_[row], way);
   }
   return end;
 }
@@ -101,9 +103,9 @@ void ProgramRun::emit_motion() {
     if (moves || explicit_motion) emit_cycle(code);
     return;
   }
-  if (code == 20 || code == 30) {
+  if (code == 20 || code == 30 || code == kCircleThroughPoint) {
     if (taken) return;
-    const bool centre = words_.any_of("IJKR");
+    const bool centre = words_.any_of("IJKR") || via_given_ != 0;
     if (!moves && !centre) {
       if (explicit_motion)
         fail("arc without end point and centre; allowed are axis words with I J K or R",
@@ -153,12 +155,25 @@ void ProgramRun::emit_straight(int code) {
   emit_move(std::move(move));
 }
 
+/// Of the word that makes an arc what it is.
+int ProgramRun::column_of_arc() const {
+  for (const char letter : {'R', 'I', 'J', 'K', 'X', 'Y', 'Z'})
+    if (words_.has(letter)) return words_.column(letter);
+  return words_.column(GGroup::motion);
+}
+
 void ProgramRun::emit_arc() {
   Move move;
   move.start = position_;
   move.end = target();
   move.kind = Move::Kind::arc;
-  move.arc = arc_to(move.end);
+  try {
+    move.arc =
+        modal_.motion == kCircleThroughPoint ? arc_through_point(move.end) : arc_to(move.end);
+  } catch (const LineError& error) {
+    if (error.column > 0) throw;
+    throw LineError(error.what(), column_of_arc());
+  }
   set_move_feed(move);
   emit_move(std::move(move));
 }
@@ -195,6 +210,7 @@ void ProgramRun::emit_thread(int code) {
          words_.column('K'));
   if (modal_.spindle != 3 && modal_.spindle != 4)
     fail(name + " with the spindle at rest; M3 or M4 first", column);
+  if (modal_.surface) fail(name + " under G96; allowed is G97", column);
   if (!(modal_.spindle_speed > 0)) fail(name + " without S", column);
   if (words_.any_of("AC")) fail(name + " with A or C; allowed are X Y Z", column);
   Move move;
@@ -240,8 +256,9 @@ void ProgramRun::set_move_feed(Move& move) const {
   }
   double per_minute = 1;
   if (modal_.feed == 950) {
-    if (!(modal_.spindle_speed > 0)) fail("feed per turn (G95) without S");
-    per_minute = modal_.spindle_speed / (2 * kPi);  // turns per second
+    const double speed = spindle_speed_at(move.end[kX]);
+    if (!(speed > 0)) fail("feed per turn (G95) without S");
+    per_minute = speed / (2 * kPi);  // turns per second
     move.feed_per_turn = modal_.linear_feed;
   }
   double seconds = 0;
@@ -279,6 +296,10 @@ Arc ProgramRun::arc_to(const Coordinates& end) {
     fail(by_centre ? "arc with R and with I J K; allowed is one of both"
                    : "arc without centre; allowed are I J K or R",
          words_.column('R'));
+  const auto absolute_way = [&](char letter) {
+    return words_.has(letter) && way_[static_cast<std::size_t>(letter - 'A')] == Way::absolute;
+  };
+  const bool centre_absolute = absolute_way(centre_u) || absolute_way(centre_v);
   words_.use("IJKRP");
   int turns = 1;
   if (words_.has('P')) {
@@ -292,7 +313,7 @@ Arc ProgramRun::arc_to(const Coordinates& end) {
   PlanarArc planar;
   if (!by_centre) {
     planar = arc_of_radius(from, to, length('R'), clockwise, turns);
-  } else if (modal_.arc_absolute) {
+  } else if (modal_.arc_absolute || centre_absolute) {
     if (!words_.has(centre_u) || !words_.has(centre_v))
       fail(fmt::format("under G90.1 an arc needs {} and {}", centre_u, centre_v));
     Coordinates centre = work_.to_words(position_);
@@ -332,8 +353,14 @@ void ProgramRun::emit_dwell() {
   } else if (fanuc_ && words_.has('X')) {
     words_.use("X");
     seconds = words_.value('X');
-  } else if (options_.dialect == Dialect::siemens && words_.has('F')) {
+  } else if (siemens_dialect_ && words_.has('F')) {
+    words_.use("F");
     seconds = words_.value('F');
+  } else if (siemens_dialect_ && words_.has('S')) {
+    const double speed = spindle_speed_at(position_[kX]);
+    if (!(speed > 0)) fail("G4 S (turns of the spindle) without a speed of the spindle", column);
+    words_.use("S");
+    seconds = words_.value('S') * 2 * kPi / speed;
   } else {
     if (words_.any_axis()) fail("G4 takes no axis words; allowed is P (seconds)", column);
     fail("G4 without P (seconds)", column);
@@ -398,7 +425,7 @@ void ProgramRun::emit_tool_align() {
 
 void ProgramRun::emit_move(Move move) {
   move.frame = frame_;
-  move.exact = modal_.exact;
+  move.exact = modal_.exact || words_.code(GGroup::once) == 90;
   move.tolerance = modal_.tolerance;
   move.dynamics = modal_.dynamics;
   move.line = line_number();

@@ -200,7 +200,7 @@ std::optional<double> ProgramRun::read(int number) const {
     case 4114:
       return number_;
     case 4119:
-      return modal_.spindle_speed / unit::rpm.to_si;
+      return spindle_speed_at(position_[kX]) / unit::rpm.to_si;
     case 4120:
       return selected_tool_;
     default:
@@ -242,7 +242,7 @@ std::optional<double> ProgramRun::read(std::string_view name) const {
     if (modal_.feed == 930) return modal_.linear_feed * 60;
     return modal_.linear_feed / modal_.length_unit * (modal_.feed == 950 ? 1 : 60);
   }
-  if (is("_rpm")) return modal_.spindle_speed / unit::rpm.to_si;
+  if (is("_rpm")) return spindle_speed_at(position_[kX]) / unit::rpm.to_si;
   if (is("_metric")) return modal_.length_unit == kMm;
   if (is("_imperial")) return modal_.length_unit != kMm;
   if (is("_absolute")) return modal_.absolute;

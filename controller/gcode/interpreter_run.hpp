@@ -28,13 +28,14 @@ struct GcodeModal {
   bool exact = false;
   double tolerance = 0;
   NcParams::Dynamics dynamics = NcParams::Dynamics::smooth;
-  bool to_initial = true;       ///< G98
-  bool constant_speed = false;  ///< G96
+  bool to_initial = true;  ///< G98
   Length length = Length::none;
   double tool_length = 0;                   ///< of the RTCP frame
   double linear_feed = 0, rotary_feed = 0;  ///< [m/s], [rad/s] (G93: 1/s; G95: m per turn); 0: none
   double spindle_speed = 0;                 ///< [rad/s]
   int spindle = 5;                          ///< M3, M4, M5, M19
+  std::optional<SurfaceSpeed> surface;      ///< G96
+  double speed_limit = 0;                   ///< Fanuc's G92 S [rad/s]; 0: none
   bool feed_override = true;                ///< M48, M50
 };
 
@@ -57,6 +58,8 @@ class ProgramRun : public SystemParameters {
 
  private:
   using Dialect = InterpreterOptions::Dialect;
+  /// How the number of an axis word counts.
+  enum class Way : std::uint8_t { modal, absolute, incremental, shortest, upwards, downwards };
   using Flow = FlowLine::Kind;
 
   struct Unit {
@@ -87,6 +90,7 @@ class ProgramRun : public SystemParameters {
   bool about_to_read(int line) const;
   bool read_words(Cursor& at);
   void read_letter(Cursor& at);
+  void refuse_word(Cursor& at) const;
   bool read_keyword(Cursor& at);
   void read_assignment(Cursor& at);
   void apply_assignments();
@@ -121,10 +125,16 @@ class ProgramRun : public SystemParameters {
   void set_modes();
   void set_path_mode();
   void set_dynamics();
+  void set_high_speed();
   bool take_dynamics(Cursor& at);
   void set_feed();
   void set_spindle();
+  void set_surface_speed();
+  void emit_spindle(int code);
+  void check_speed(double rpm) const;
+  double spindle_speed_at(double x) const;
   void set_tool();
+  void set_outputs();
   void set_tool_length();
   void set_cutter();
   void set_offsets();
@@ -142,6 +152,7 @@ class ProgramRun : public SystemParameters {
   void emit_motion();
   void emit_straight(int code);
   void emit_arc();
+  int column_of_arc() const;
   void emit_probe(int code);
   void emit_thread(int code);
   void emit_reference_return(int code);
@@ -153,10 +164,23 @@ class ProgramRun : public SystemParameters {
   void set_move_feed(Move& move) const;
   void emit_move(Move move);
   void emit(Block block);
+  bool absolute(char letter) const {
+    const Way way = way_[static_cast<std::size_t>(letter - 'A')];
+    return way == Way::modal ? modal_.absolute : way != Way::incremental;
+  }
   double length(char letter) const { return words_.value(letter) * modal_.length_unit; }
   double in_si(std::size_t axis, double word) const {
     return word * (is_rotary(axis) ? kDegree : modal_.length_unit);
   }
+
+  // the dialect of Siemens: interpreter_siemens.cpp
+  bool read_siemens_word(Cursor& at);
+  bool read_siemens_address(char letter, Cursor& at, int column);
+  double siemens_value(char letter, Cursor& at);
+  bool siemens_code(double& number) const;
+  static double turned(double to, double from, Way way);
+  Coordinates via_point() const;
+  Arc arc_through_point(const Coordinates& end);
 
   // canned cycles: interpreter_cycles.cpp
   void emit_cycle(int code);
@@ -176,7 +200,7 @@ class ProgramRun : public SystemParameters {
 
   const Machine machine_;
   InterpreterOptions options_;
-  bool fanuc_ = false;
+  bool fanuc_ = false, siemens_dialect_ = false;
   std::vector<std::unique_ptr<Unit>> units_;
   std::size_t unit_ = 0;
   Parameters parameters_;
@@ -186,7 +210,10 @@ class ProgramRun : public SystemParameters {
   int number_ = 0;                  ///< N
   std::array<double, 3> vector_{};  ///< A3= B3= C3=
   unsigned vector_given_ = 0;
-  int siemens_ = 0;  ///< TRAORI: 1, TRAFOOF: 2
+  int siemens_ = 0;              ///< TRAORI: 1, TRAFOOF: 2
+  std::array<Way, 26> way_{};    ///< by letter
+  std::array<double, 3> via_{};  ///< I1= J1= K1=
+  unsigned via_given_ = 0;
   struct Assignment {
     int number;  ///< -1: by name
     std::string name;

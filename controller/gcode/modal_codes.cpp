@@ -7,7 +7,8 @@
 namespace vcnc {
 
 const char* const kKnownG =
-    "G0 G1 G2 G3 G4 G5.1 G8 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G31 G33 G33.1 G38.2..G38.5 "
+    "G0 G1 G2 G3 G4 G5.1 G8 G9 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G31 G33 G33.1 "
+    "G38.2..G38.5 "
     "G40 G41 "
     "G41.1 G42 G42.1 G43 G43.1 G43.2 G43.4 G43.5 G49 G52 G53 G53.1 G54..G59.3 G61 G61.1 G64 G65 "
     "G66 G67 G68 G68.2 G69 G73 G74 G76 G80..G89 G90 G90.1 G91 G91.1 G92 G92.1 G92.2 G92.3 G93 G94 "
@@ -21,9 +22,10 @@ constexpr std::array<GGroup, 1000> make_g_groups() {
   const auto set = [&](GGroup group, auto... codes) {
     ((t[static_cast<std::size_t>(codes)] = group), ...);
   };
-  set(GGroup::once, 40, 51, 100, 280, 281, 300, 301, 520, 530, 531, 650, 920, 921, 922, 923);
-  set(GGroup::motion, 0, 10, 20, 30, 310, 330, 331, 382, 383, 384, 385, 730, 740, 760, 800, 810,
-      820, 830, 840, 850, 860, 870, 880, 890);
+  set(GGroup::once, 40, 50, 51, 90, 100, 280, 281, 300, 301, 520, 530, 531, 650, 920, 921, 922,
+      923);
+  set(GGroup::motion, 0, 10, 20, 30, kCircleThroughPoint, 310, 330, 331, 382, 383, 384, 385, 730,
+      740, 760, 800, 810, 820, 830, 840, 850, 860, 870, 880, 890);
   set(GGroup::plane, 170, 180, 190);
   set(GGroup::distance, 900, 910);
   set(GGroup::arc_distance, 901, 911);
@@ -73,6 +75,7 @@ MGroup m_group(int number) {
 }
 
 std::string code_name(int tenths) {
+  if (tenths == kCircleThroughPoint) return "CIP";
   return tenths % 10 ? fmt::format("G{}.{}", tenths / 10, tenths % 10)
                      : fmt::format("G{}", tenths / 10);
 }

@@ -40,6 +40,9 @@ enum class MGroup : std::uint8_t {
 };
 inline constexpr int kMGroups = 9;
 
+/// CIP of Siemens, under a number that no program can write.
+inline constexpr int kCircleThroughPoint = 35;
+
 /// G codes are counted in tenths: G43.4 is 434.
 GGroup g_group(int tenths);
 MGroup m_group(int number);

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <fstream>
+#include <string>
 
 #include "bus/tick.hpp"
 #include "controller/limit_use.hpp"
@@ -83,10 +85,20 @@ void measure_all(const char* title, const std::vector<PlanProgram>& programs,
     if (!only || program.name.find(only) != std::string::npos) measure(program, machine, dynamics);
 }
 
+/// The three-axis set as files, for another planner.
+void write_programs(const std::string& folder) {
+  for (const PlanProgram& program : three_axis_programs())
+    std::ofstream(folder + "/" + program.name + ".ngc") << program.text;
+}
+
 }  // namespace
 }  // namespace vcnc
 
 int main(int argc, char** argv) {
+  if (argc > 2 && std::string(argv[1]) == "--programs") {
+    vcnc::write_programs(argv[2]);
+    return 0;
+  }
   if (argc > 1) vcnc::only = argv[1];
   using Dynamics = vcnc::NcParams::Dynamics;
   for (const Dynamics dynamics : {Dynamics::smooth, Dynamics::fast}) {

@@ -8,6 +8,7 @@
 #include "controller/limit_use.hpp"
 #include "controller/planner.hpp"
 #include "planned_moves.hpp"
+#include "tests/sanitized.hpp"
 
 namespace vcnc {
 namespace {
@@ -83,6 +84,7 @@ TEST(PathStream, TheSettledPathIsThatOfTheWhole) {
 class Streamed : public testing::TestWithParam<Dynamics> {};
 
 TEST_P(Streamed, KeepsTheLimitsAndDoesNotStop) {
+  if (kSanitized && GetParam() == Dynamics::fast) GTEST_SKIP() << "takes minutes under a sanitizer";
   const Machine machine = test_machine();
   const std::vector<Move> moves = surface(4000, GetParam());
   Trajectory whole(Path(moves, kAngleTolerance), machine);

@@ -13,6 +13,7 @@
 #include "controller/path.hpp"
 #include "tests/controller/program_file.hpp"
 #include "tests/controller/random_program.hpp"
+#include "tests/sanitized.hpp"
 
 namespace vcnc {
 namespace {
@@ -113,7 +114,7 @@ TEST_P(RandomPrograms, KeepLimitsAndTolerance) {
   const std::string name = GetParam();
   Machine machine = machine_of(name);
   machine.probe.in_spindle = false;  // feeds of cutting
-  for (unsigned seed = 1; seed <= 120; ++seed) {
+  for (unsigned seed = 1; seed <= (kSanitized ? 12 : 120); ++seed) {
     RandomProgram random(seed);
     const std::string text = random.text();
     SCOPED_TRACE(name + " seed " + std::to_string(seed));
@@ -157,7 +158,7 @@ TEST_P(RandomPrograms, KeepLimitsAndTolerance) {
 TEST_P(RandomPrograms, AHoldBringsTheAxesToRestOnThePath) {
   Machine machine = machine_of(GetParam());
   machine.probe.in_spindle = false;
-  for (unsigned seed = 1; seed <= 40; ++seed) {
+  for (unsigned seed = 1; seed <= (kSanitized ? 6 : 40); ++seed) {
     RandomProgram random(seed);
     const std::string text = random.text();
     const ProgramFile file(text);
@@ -201,7 +202,7 @@ TEST_P(RandomPrograms, AHoldBringsTheAxesToRestOnThePath) {
 TEST_P(RandomPrograms, GoesOnAfterAHoldAsIfNothingHadBeen) {
   Machine machine = machine_of(GetParam());
   machine.probe.in_spindle = false;
-  for (unsigned seed = 1; seed <= 40; ++seed) {
+  for (unsigned seed = 1; seed <= (kSanitized ? 6 : 40); ++seed) {
     RandomProgram random(seed);
     const std::string text = random.text();
     SCOPED_TRACE("seed " + std::to_string(seed));

@@ -3,8 +3,8 @@
 #include <set>
 
 #include "configs/config.hpp"
-#include "diagnosis/candidate.hpp"
-#include "diagnosis/effect_stage.hpp"
+#include "diagnosis/replica/effect_stage.hpp"
+#include "diagnosis/search/candidate.hpp"
 #include "model/parameters.hpp"
 
 namespace vcnc {

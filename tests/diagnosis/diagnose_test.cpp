@@ -3,7 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
+#include <set>
+#include <tuple>
 
+#include "diagnosis/commission.hpp"
+#include "diagnosis/search/period_slip_search.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc {
@@ -57,6 +61,105 @@ TEST(Diagnose, NamesALawWhereTheLibraryHasNone) {
   const Diagnosis d = diagnosed(record);
   ASSERT_TRUE(d.law);
   EXPECT_EQ(d.verdict, DiagnosisVerdict::unexplained);
+}
+
+/// Dry friction of 0.15 N under a noise of 2 N: significant over 12 s, and nothing to be told.
+TEST(Diagnose, NotesWhatIsOfNoConsequence) {
+  Machine truth;
+  move_number(truth, "effects.X.coulomb.level_N", 0.15);
+  Record record = toy::commands(1000, 8);
+  toy::measure(record, truth, 31);
+  const Diagnosis d = diagnosed(record);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::no_deviation);
+  EXPECT_TRUE(d.effects.empty());
+  ASSERT_EQ(d.notes.size(), 1U);
+  EXPECT_EQ(d.notes[0].find("X.coulomb fits a little"), 0U) << d.notes[0];
+  EXPECT_EQ(number_of(d.found, "effects.X.coulomb.level_N"), 0);
+  // Three times as much is an effect.
+  move_number(truth, "effects.X.coulomb.level_N", 0.5);
+  toy::measure(record, truth, 31);
+  const Diagnosis more = diagnosed(record);
+  ASSERT_EQ(more.effects.size(), 1U);
+  EXPECT_EQ(more.effects[0].name, "coulomb");
+}
+
+TEST(Diagnose, PutsBackNumbersThatAreNotNeeded) {
+  // A candidate of two numbers, of which the machine has one.
+  std::vector<Candidate> all = toy::candidates();
+  std::erase_if(all, [](const Candidate& c) { return c.effect == "squareness"; });
+  for (Candidate& c : all)
+    if (c.effect == "scale_error")
+      c.numbers.push_back({"effects.geometry.squareness.xy_urad", 50, -5000, 5000});
+  Machine truth;
+  move_number(truth, "effects.X.scale_error.error_ppm", 80);
+  const Record record = measured(truth, 32);
+  toy::ToyReplica replica(record);
+  const Diagnosis d = diagnose({record, replica, Machine(), all}, std::nullopt);
+  ASSERT_EQ(d.effects.size(), 1U);
+  ASSERT_EQ(d.effects[0].numbers.size(), 1U);
+  EXPECT_EQ(d.effects[0].numbers[0].key, "effects.X.scale_error.error_ppm");
+  EXPECT_EQ(number_of(d.found, "effects.geometry.squareness.xy_urad"), 0);
+}
+
+TEST(Diagnose, FindsASlipOfTheCounterBesideAnEffect) {
+  Machine truth;
+  truth.effects.get<PeriodSlip>() = {.periods = -2, .channel = 0, .start = 5.3};
+  move_number(truth, "effects.X.load_play.width_um", 2);
+  const Diagnosis d = diagnosed(measured(truth, 33));
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
+  ASSERT_EQ(d.effects.size(), 2U);
+  EXPECT_EQ(d.effects[0].name, "period_slip");
+  EXPECT_EQ(d.effects[0].numbers[0].value, -2);
+  EXPECT_EQ(d.effects[0].numbers[1].value, 0);
+  EXPECT_NEAR(d.effects[0].numbers[2].value, 5.3, 1e-3);
+  EXPECT_EQ(d.effects[1].name, "load_play");
+  EXPECT_EQ(d.found.effects.get<PeriodSlip>().periods, -2);
+}
+
+TEST(PeriodSlipSearch, TakesOneStepOfWholePeriodsThatStays) {
+  constexpr double kPeriod = 20e-6;
+  Record record;
+  record.signals.push_back({SignalKind::deflection, 0, "x", std::vector<double>(2000, 0.0), 0});
+  record.signals.push_back({SignalKind::deflection, 1, "y", std::vector<double>(2000, 0.0), 0});
+  const std::vector<ComparedChannel> channels{{SignalKind::deflection, 0},
+                                              {SignalKind::deflection, 1}};
+  const Prediction zero(2, std::vector<double>(2000, 0.0));
+  const auto stepped = [&](std::vector<std::tuple<std::size_t, std::size_t, double>> steps) {
+    Record r = record;
+    for (const auto& [channel, at, size] : steps)
+      for (std::size_t k = at; k < 2000; ++k) r.signals[channel].value[k] += size;
+    return find_period_slip(r, channels, zero, kPeriod);
+  };
+  const auto one = stepped({{1, 700, kPeriod * 1.05}});
+  ASSERT_TRUE(one);
+  EXPECT_EQ(one->periods, 1);
+  EXPECT_EQ(one->channel, 1);
+  EXPECT_DOUBLE_EQ(one->start, 0.7);
+  EXPECT_FALSE(stepped({}));
+  EXPECT_FALSE(stepped({{1, 700, kPeriod * 0.7}}));                     // no whole period
+  EXPECT_FALSE(stepped({{1, 700, kPeriod}, {1, 701, -kPeriod}}));       // a spike
+  EXPECT_FALSE(stepped({{1, 700, kPeriod}, {1, 900, -kPeriod}}));       // comes and goes
+  EXPECT_FALSE(stepped({{1, 700, kPeriod}, {0, 700, 0.5 * kPeriod}}));  // the ball itself moved
+}
+
+TEST(Diagnose, NamesProgramsThatThereAre) {
+  const std::set<std::string> known{"circle", "cone", "diagnosis", "s-piece", "step"};
+  Machine truth;
+  std::vector<Candidate> all = toy::candidates();
+  // Effects that the toy does not show, one for every way of showing one.
+  for (const char* name : {"backlash", "cable_chain", "encoder_eccentricity", "structural_mode",
+                           "thermal_drift", "friction_fade", "sample_latency"})
+    all.push_back({name, "Z", {{"effects.Z.backlash.gap_um", 5, 0, 1000, true}}, {}});
+  const Record record = measured(truth, 34);
+  toy::ToyReplica replica(record);
+  const Diagnosis d = diagnose({record, replica, truth, all}, std::nullopt);
+  std::size_t named = 0;
+  for (const Excitation& e : d.excitation) {
+    if (e.program.empty()) continue;
+    ++named;
+    EXPECT_TRUE(known.contains(e.program)) << e.name << ": " << e.program;
+  }
+  EXPECT_GE(named, 7U);
 }
 
 TEST(Diagnose, ReferenceRunCancelsWhatTheModelGetsWrong) {

@@ -1,13 +1,13 @@
-#include "diagnosis/diagnosis_page.hpp"
+#include "diagnosis/report/diagnosis_page.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "diagnosis/diagnosis_figures.hpp"
-#include "diagnosis/diagnosis_json.hpp"
-#include "diagnosis/diagnosis_text.hpp"
+#include "diagnosis/report/diagnosis_figures.hpp"
+#include "diagnosis/report/diagnosis_json.hpp"
+#include "diagnosis/report/diagnosis_text.hpp"
 
 namespace vcnc {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "configs/config.hpp"
 #include "controller/player.hpp"
-#include "diagnosis/stretches.hpp"
+#include "diagnosis/records/stretches.hpp"
 
 namespace vcnc {
 namespace {

@@ -10,8 +10,8 @@
 #include <string>
 
 #include "configs/config.hpp"
-#include "diagnosis/import_table.hpp"
-#include "diagnosis/machine_replica.hpp"
+#include "diagnosis/records/import_table.hpp"
+#include "diagnosis/replica/machine_replica.hpp"
 #include "model/drive/sampled_controller.hpp"
 
 namespace vcnc {

@@ -3,10 +3,10 @@
 
 #include <cmath>
 
-#include "diagnosis/intervals.hpp"
-#include "diagnosis/least_squares.hpp"
-#include "diagnosis/noise_audit.hpp"
-#include "diagnosis/selection.hpp"
+#include "diagnosis/search/intervals.hpp"
+#include "diagnosis/search/least_squares.hpp"
+#include "diagnosis/search/noise_audit.hpp"
+#include "diagnosis/search/selection.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc {

@@ -4,7 +4,7 @@ Definitions. L of an effect: the detection limit that the diagnosis itself state
 its excitation table. Strata of single effects: weak below 3 L, strong from 3 L on; below L, or where
 the run does not excite the effect at all, silence is the right answer. A name is right when effect
 and place are; a declared number found out of tolerance is right when it belongs to the effect. An attribution
-is an effect that the report does not call minor.
+is an effect that the report does not call minor, of the machine or of the measurement but not of the set-up.
 """
 
 import math
@@ -48,7 +48,8 @@ def label(e):
 
 
 def claims(report):
-    return [e for e in report.get("effects", []) if not e.get("minor", False)]
+    """Where the piece was clamped is no claim about the machine."""
+    return [e for e in report.get("effects", []) if not e.get("minor", False) and e.get("axis") != "setup"]
 
 
 def in_class(effect, found):

@@ -1,4 +1,4 @@
-#include "diagnosis/import_table.hpp"
+#include "diagnosis/records/import_table.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -12,9 +12,9 @@
 #include <random>
 
 #include "configs/config.hpp"
-#include "diagnosis/any_record.hpp"
-#include "diagnosis/record_check.hpp"
-#include "diagnosis/record_file.hpp"
+#include "diagnosis/records/any_record.hpp"
+#include "diagnosis/records/record_check.hpp"
+#include "diagnosis/records/record_file.hpp"
 
 namespace vcnc {
 namespace {

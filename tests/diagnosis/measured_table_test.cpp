@@ -1,10 +1,10 @@
-#include "diagnosis/measured_table.hpp"
+#include "diagnosis/records/measured_table.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "diagnosis/time_base.hpp"
+#include "diagnosis/records/time_base.hpp"
 
 namespace vcnc {
 namespace {

@@ -1,4 +1,4 @@
-#include "diagnosis/record_from_recording.hpp"
+#include "diagnosis/records/record_from_recording.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,8 +7,8 @@
 
 #include "apps/experiments.hpp"
 #include "configs/config.hpp"
-#include "diagnosis/machine_replica.hpp"
-#include "diagnosis/record_from_recording.hpp"
+#include "diagnosis/records/record_from_recording.hpp"
+#include "diagnosis/replica/machine_replica.hpp"
 
 namespace vcnc {
 
@@ -41,8 +41,7 @@ struct Misfit {
   double rms = 0, largest = 0;
 };
 inline Misfit misfit(const RecordedRun& run, const MachineReplica& replica,
-                     const Prediction& prediction, SignalKind kind,
-                     bool rotary = false) {
+                     const Prediction& prediction, SignalKind kind, bool rotary = false) {
   Misfit result;
   double sum = 0, count = 0;
   for (std::size_t c = 0; c < prediction.size(); ++c) {

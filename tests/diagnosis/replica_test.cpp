@@ -4,7 +4,7 @@
 #include <cstring>
 #include <future>
 
-#include "diagnosis/commanded_motion.hpp"
+#include "diagnosis/replica/commanded_motion.hpp"
 #include "tests/diagnosis/recorded_run.hpp"
 
 namespace vcnc {
@@ -13,8 +13,8 @@ namespace {
 bool same_bits(const Prediction& a, const Prediction& b) {
   if (a.size() != b.size()) return false;
   for (std::size_t c = 0; c < a.size(); ++c)
-    if (a[c].size() != b[c].size() || std::memcmp(&*a[c].begin(), &*b[c].begin(),
-                                                  a[c].size() * sizeof(double)) != 0)
+    if (a[c].size() != b[c].size() ||
+        std::memcmp(&*a[c].begin(), &*b[c].begin(), a[c].size() * sizeof(double)) != 0)
       return false;
   return true;
 }

@@ -1,4 +1,4 @@
-#include "diagnosis/selection.hpp"
+#include "diagnosis/search/selection.hpp"
 
 #include <gtest/gtest.h>
 
@@ -35,7 +35,8 @@ TEST(Selection, NamesEveryEffectOfTheToyMachine) {
        {Injected{"effects.X.command_delay.delay_ms", 0.01, "X.command_delay"},
         Injected{"effects.X.coulomb.level_N", 5, "X.coulomb"},
         Injected{"effects.X.viscous.coefficient_Ns_per_m", 60, "X.viscous"},
-        Injected{"effects.X.scale_error.error_ppm", -8, "X.scale_error"},
+        // Never quite absent, so a number that leaves its tolerance.
+        Injected{"effects.X.scale_error.error_ppm", -8, "effects.X.scale_error.error_ppm"},
         Injected{"effects.X.load_play.width_um", 0.4, "X.load_play"},
         Injected{"effects.geometry.squareness.xy_urad", 6, "geometry.squareness"},
         Injected{"axes.X.load_kg", 545, "axes.X.load_kg"}}) {

@@ -1,4 +1,4 @@
-#include "diagnosis/stretches.hpp"
+#include "diagnosis/records/stretches.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <vector>
 
-#include "diagnosis/candidate.hpp"
-#include "diagnosis/freed_number.hpp"
-#include "diagnosis/record.hpp"
-#include "diagnosis/replica.hpp"
+#include "diagnosis/records/record.hpp"
+#include "diagnosis/replica/replica.hpp"
+#include "diagnosis/search/candidate.hpp"
+#include "diagnosis/search/freed_number.hpp"
 #include "model/math.hpp"
 #include "model/probe/noise.hpp"
 
@@ -46,7 +46,7 @@ inline Record commands(std::size_t lap, int laps) {
 ///   F_x = m a + F_c s(v) + k v          load (declared 500 kg), coulomb, viscous
 ///   d_x = e_x + eps q_x + alpha q_y     scale_error, squareness
 ///         + w/2 s(v) + A sin(2 pi q/p + psi) + o    load_play, pitch_periodic, piece_offset
-///         + laws of the displacement of X
+///         + laws of the displacement of X + a slip of the period counter
 class ToyReplica : public Replica {
  public:
   explicit ToyReplica(const Record& commands) : commands_(commands) {
@@ -63,6 +63,7 @@ class ToyReplica : public Replica {
     const double play = e.get<LoadPlay>().width, xy = m.effects.get<Squareness>().xy;
     const PitchPeriodic& pitch = e.get<PitchPeriodic>();
     const double offset = m.effects.get<PieceOffset>().shift.x();
+    const PeriodSlip& slip = m.effects.get<PeriodSlip>();
     std::vector<std::vector<double>> all(3, std::vector<double>(x.size()));
     for (std::size_t k = 0; k < x.size(); ++k) {
       const std::size_t before = k > 0 ? k - 1 : k, after = k + 1 < x.size() ? k + 1 : k;
@@ -83,6 +84,8 @@ class ToyReplica : public Replica {
       for (const Law& law : m.effects.laws)
         if (law.point == Law::Point::displacement && law.axis == Law::OfAxis::X)
           all[2][k] += law(static_cast<double>(k) * h, motions);
+      if (static_cast<double>(k) * h + 0.5 * h >= slip.start)
+        all[2][k] += slip.periods * m.probe.signal_period;
     }
     return {all.begin(), all.end()};
   }

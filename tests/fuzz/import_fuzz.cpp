@@ -3,7 +3,7 @@
 
 #include "configs/config.hpp"
 #include "configs/import_map.hpp"
-#include "diagnosis/import_table.hpp"
+#include "diagnosis/records/import_table.hpp"
 #include "fuzz.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

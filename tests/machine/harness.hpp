@@ -17,6 +17,7 @@
 #include "bus/messages.hpp"
 #include "configs/config.hpp"
 #include "model/geometry/piece.hpp"
+#include "tests/sanitized.hpp"
 
 namespace vcnc {
 
@@ -53,13 +54,6 @@ inline std::unique_ptr<PieceParams> piece_params(const Machine& machine) {
              ? nullptr
              : std::make_unique<PieceParams>(load_piece(machine.setup.piece));
 }
-
-/// Builds with a sanitizer are ten times slower and take fewer cases.
-#ifdef VCNC_SANITIZED
-inline constexpr bool kSanitized = true;
-#else
-inline constexpr bool kSanitized = false;
-#endif
 
 /// A file that is gone when the test is over.
 class TemporaryFile {

@@ -20,7 +20,7 @@ class Expression : public testing::Test {
  protected:
   double value(const std::string& text) {
     Cursor at(text);
-    const double x = Evaluator(parameters, vacant).value(at);
+    const double x = Evaluator(parameters, vacant, siemens).value(at);
     at.skip_blanks();
     EXPECT_TRUE(at.at_end()) << text << ": stopped at column " << at.column();
     return x;
@@ -35,7 +35,7 @@ class Expression : public testing::Test {
   }
   NoSystem system;
   Parameters parameters{system};
-  bool vacant = false;
+  bool vacant = false, siemens = false;
 };
 
 TEST_F(Expression, Numbers) {

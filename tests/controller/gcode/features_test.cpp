@@ -485,5 +485,137 @@ TEST(GcodeExpressions, AnUnknownOperatorIsNamed) {
   EXPECT_NE(refused("G0 X[1 + 2").find("'[' without its ']'"), std::string::npos);
 }
 
+// ------------------------------------------------------------------------------ surface speed
+
+std::vector<SpindleWord> spindle_words(const std::string& text) {
+  std::vector<SpindleWord> words;
+  for (const Block& block : blocks_of(text))
+    if (const SpindleWord* word = std::get_if<SpindleWord>(&block)) words.push_back(*word);
+  return words;
+}
+
+TEST(SurfaceSpeed, IsThatOfTheRadiusUpToTheLimit) {
+  // n = v / (2 pi r): 100 m/min at 20 mm are 795.77 rpm; G54 and G92 move the axis of rotation.
+  const auto words =
+      spindle_words("G10 L2 P1 X30\nG54 G0 X20\nG96 S100 D2000 M3\nG0 X5\nS200\nG97\nS500");
+  ASSERT_EQ(words.size(), 4u);
+  EXPECT_NEAR(words[0].speed * 30 / kPi, 100e3 / (2 * kPi * 20), 1e-9);
+  ASSERT_TRUE(words[0].surface);
+  EXPECT_NEAR(words[0].surface->axis, 30e-3, 1e-15);
+  EXPECT_NEAR(words[0].surface->at(30e-3 - 40e-3) * 30 / kPi, 100e3 / (2 * kPi * 40), 1e-9);
+  EXPECT_NEAR(words[0].surface->at(30e-3) * 30 / kPi, 2000, 1e-9);
+  EXPECT_NEAR(words[1].speed * 30 / kPi, 2000, 1e-9);  // 200 m/min at 5 mm would be 6366 rpm
+  EXPECT_FALSE(words[2].surface);
+  EXPECT_NEAR(words[2].speed * 30 / kPi, 2000, 1e-9);  // G97 keeps what it has become
+  EXPECT_NEAR(words[3].speed * 30 / kPi, 500, 1e-9);
+  // In inches S is in ft/min: 328.084 of them are 100 m/min.
+  EXPECT_NEAR(spindle_words("G20 G0 X1\nG96 S328.084 M3")[0].speed * 30 / kPi,
+              100e3 / (2 * kPi * 25.4), 1e-3);
+}
+
+TEST(SurfaceSpeed, GivesTheFeedPerTurnItsSpeed) {
+  const auto moves = moves_of("G0 X20\nG96 S100 D3000 M3\nG95 F0.2 G1 X10");
+  ASSERT_EQ(moves.size(), 2u);
+  EXPECT_NEAR(moves[1].feed_per_turn, 0.2e-3, 1e-15);
+  EXPECT_NEAR(moves[1].feed, 0.2e-3 * (100.0 / 60) / (2 * kPi * 10e-3), 1e-12);
+}
+
+TEST(SurfaceSpeed, IsRefusedWhereItMakesNoSense) {
+  EXPECT_NE(refused("G96 M3").find("1:1: G96 without S"), std::string::npos);
+  EXPECT_NE(refused("G96 S0 M3").find("greater than 0"), std::string::npos);
+  EXPECT_NE(refused("G0 X9\nG96 S10 M3\nG33 Z1 K1").find("G33 under G96"), std::string::npos);
+}
+
+// ------------------------------------------------------------------------------------ Siemens
+
+InterpreterOptions siemens() {
+  InterpreterOptions options = bare();
+  options.dialect = InterpreterOptions::Dialect::siemens;
+  return options;
+}
+
+TEST(Siemens, RParametersAreSetAndUsed) {
+  EXPECT_EQ(path_of("R1=10 R2=R1*(R1+2)/4\nR[R1]=SIN(30)*6\nG0 X=R1 Y=R2 Z=R10", siemens()),
+            "r 10 30 3");
+  EXPECT_EQ(path_of("G0 X=ATAN2(1,1) Y=POT(3) Z=TRUNC(-2.5)", siemens()), "r 45 9 -2");
+}
+
+TEST(Siemens, WordsCountAsTheyAreWritten) {
+  EXPECT_EQ(path_of("G90 G0 X10 Y10\nX=IC(5) Y=AC(3)\nG91 X=AC(1) Y2", siemens()),
+            "r 10 10 0; r 15 3 0; r 1 5 0");
+  const auto moves = moves_of("G0 C350\nC=DC(10)\nC=ACN(20)\nC=ACP(20)\nC=ACP(10)", siemens());
+  ASSERT_EQ(moves.size(), 4u);  // ACP(20) is where C stands
+  EXPECT_NEAR(moves[1].end[kC] / kDegree, 370, 1e-9);
+  EXPECT_NEAR(moves[2].end[kC] / kDegree, 20, 1e-9);
+  EXPECT_NEAR(moves[3].end[kC] / kDegree, 370, 1e-9);
+}
+
+TEST(Siemens, ACircleGoesThroughThePointBetween) {
+  // The three points lie on the circle of radius 5 about (4, 3), which goes through 0.
+  const auto ccw = moves_of("G1 F100 X0 Y0\nCIP X8 Y6 I1=8 J1=0", siemens());
+  ASSERT_EQ(ccw.size(), 1u);
+  EXPECT_NEAR(ccw[0].arc.centre.x(), 4e-3, 1e-12);
+  EXPECT_NEAR(ccw[0].arc.centre.y(), 3e-3, 1e-12);
+  EXPECT_NEAR(ccw[0].arc.sweep, kPi, 1e-9);
+  const auto cw = moves_of("G91 G1 F100\nCIP X8 Y6 I1=0 J1=6 TURN=2", siemens());
+  ASSERT_EQ(cw.size(), 1u);
+  EXPECT_NEAR(cw[0].arc.sweep, -5 * kPi, 1e-9);
+  EXPECT_NE(refused("F100\nCIP X2 Y2 I1=1 J1=1", siemens()).find("lie on a line"),
+            std::string::npos);
+  EXPECT_NE(refused("F100\nCIP X2 Y2 Z1 I1=1", siemens()).find("active plane"), std::string::npos);
+}
+
+TEST(Siemens, ADwellTakesNoFeedAndNoSpeed) {
+  const auto blocks = blocks_of("S600 M3\nG1 F100 X1\nG4 F2.5\nG4 S20\nX2", siemens());
+  ASSERT_EQ(blocks.size(), 5u);
+  EXPECT_DOUBLE_EQ(std::get<Dwell>(blocks[2]).seconds, 2.5);
+  EXPECT_NEAR(std::get<Dwell>(blocks[3]).seconds, 2, 1e-12);
+  EXPECT_NEAR(std::get<Move>(blocks[4]).feed, 0.1 / 60, 1e-15);
+}
+
+TEST(Siemens, UnknownWordsAreNamed) {
+  EXPECT_NE(refused("G1 F100 X1\nCT X2", siemens()).find("2:1: unknown word CT"),
+            std::string::npos);
+  EXPECT_NE(refused("CIP X8 Y6").find("1:1: unknown word CIP"), std::string::npos);
+}
+
+// ------------------------------------------------------------------------- inputs and outputs
+
+TEST(Inputs, AreOffSoThatWaitsForThemTimeOut) {
+  const auto blocks = blocks_of("M66 P3 L3 Q1.5\nG0 X#5399\nM66 P3 L4 Q1\nX[#5399+7]\nM66 E1");
+  ASSERT_EQ(blocks.size(), 3u);
+  EXPECT_DOUBLE_EQ(std::get<Dwell>(blocks[0]).seconds, 1.5);
+  EXPECT_NEAR(std::get<Move>(blocks[1]).end[kX], -1e-3, 1e-15);
+  EXPECT_NEAR(std::get<Move>(blocks[2]).end[kX], 7e-3, 1e-15);
+  for (const char* wrong : {"M66", "M66 P1 E1", "M66 P1 L1", "M66 E1 L1 Q1", "M66 P1 L9 Q1", "M62",
+                            "M65 P1.5", "M67 Q1", "M68 E-1 Q1"})
+    EXPECT_NE(refused(wrong), "accepted") << wrong;
+}
+
+// -------------------------------------------------------------------------------------- gouging
+
+/// Down into a bulb through a neck 6 mm wide, and out again.
+std::string neck(const std::string& diameter, const std::string& between = "") {
+  return "F500\nG0 X-60 Y20\nG41.1 D" + diameter + " G1 X-40 Y0\nX0\nY-20\nX-17\n" + between +
+         "Y-60\nX23\nY-20\nX6\nY0\nX40\nG40 X60 Y20";
+}
+
+TEST(Gouge, IsFoundBeyondNeighbours) {
+  EXPECT_EQ(refused(neck("5.9")), "accepted");
+  EXPECT_EQ(refused(neck("6")), "accepted");
+  EXPECT_NE(refused(neck("6.02")).find("crosses what that of line"), std::string::npos);
+  EXPECT_NE(refused(neck("8")).find("crosses what that of line"), std::string::npos);
+  EXPECT_EQ(refused(neck("8", "Z5\n")), "accepted");  // above what stands, as far as one can know
+}
+
+TEST(Gouge, NeedsAWallOnTheToolsSide) {
+  // Round a rib thinner than the tool, crossing the beginning at the end.
+  EXPECT_EQ(refused("F500\nG0 X-20 Y-30\nG41.1 D8 G1 X0 Y-20\nY50\nX3\nY0\nX-20\nG40 X-40 Y-9"),
+            "accepted");
+  // A contour that crosses itself as it is programmed.
+  EXPECT_EQ(refused("F500\nG0 X-20 Y-30\nG41.1 D8 G1 X0 Y-20\nY50\nX-60\nY0\nX20\nG40 X40"),
+            "accepted");
+}
+
 }  // namespace
 }  // namespace vcnc

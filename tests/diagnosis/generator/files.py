@@ -30,7 +30,8 @@ def machine_toml():
                 f'feedback = "{"motor" if d["motor_feedback"][i] else "load"}"',
                 f"load_{kg} = {d['load'][i]}", f"motor_inertia_kgm2 = {d['motor_inertia'][i]}",
                 f"travel_per_turn_{unit} = {turn:.12g}", f"{f} = {d['force_limit'][i]}", ""]
-    out += ["[setup]", 'piece = "piece.toml"', f"g54_mm = [0, 0, {PIECE_HEIGHT * 1e3:g}]", ""]
+    # The contact is quasi-static: a light suspension.
+    out += ["[probe]", "moving_mass_g = 1", "stylus_mass_g = 0.1", "", "[setup]", 'piece = "piece.toml"', f"g54_mm = [0, 0, {PIECE_HEIGHT * 1e3:g}]", ""]
     for i, axis in enumerate(AXES):
         e = f"[effects.{axis}."
         if d["compliance"][i]:

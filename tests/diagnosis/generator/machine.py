@@ -33,7 +33,7 @@ DECLARED = {
     "bristle": [25e6, 25e6, 25e6, 1e5, 1e5],
 }
 SURFACE_FRICTION = 0.1
-RING_RADIUS = 32.5e-3
+RING_RADIUS = 17.5e-3
 PIECE_HEIGHT = 0.05
 
 # Standard deviations of the truth about the declaration, as shares.

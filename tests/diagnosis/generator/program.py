@@ -1,9 +1,9 @@
-"""The bench's test program: circles in a ring gauge in both senses at two feeds, turns of C and A about
-the touching ball, strokes of Z. Every section begins and ends at rest; all are run twice, all once
+"""The bench's test program: circles in a ring gauge in both senses at two feeds, circles while C or A
+turns, strokes of Z. Every section begins and ends at rest; all are run twice, all once
 before any is run again, so that what grows in time differs between the repetitions.
 """
 
-RADIUS = 30.0  # of the ball centre's path [mm]; ring radius 32.5 mm, ball 3 mm: 0.5 mm deep
+RADIUS = 15.0  # of the ball centre's path [mm]; ring radius 17.5 mm, ball 3 mm: 0.5 mm deep
 HEIGHT = 8.0
 
 
@@ -24,14 +24,20 @@ def program():
         return [f"{word} X{r:g} Y0 I{r / 2:g} J0 F{feed}", f"{word} X{r:g} Y0 I{-r:g} J0",
                 f"{word} X0 Y0 I{-r / 2:g} J0"]
 
+    def turning(word):
+        """Two rounds while a rotary axis goes there and back; the ball never comes to rest on the piece."""
+        r, there = RADIUS, {"C": (120, 0), "A": (12, -12)}[word]
+        return [f"G3 X{r:g} Y0 I{r / 2:g} J0 F6000", f"G3 X{r:g} Y0 I{-r:g} J0 {word}{there[0]}",
+                f"G3 X{r:g} Y0 I{-r:g} J0 {word}{there[1]}", f"G3 X0 Y0 I{-r / 2:g} J0 {word}0"]
+
     for _ in range(2):
         for feed in (3000, 6000):
             section(f"circle F{feed} ccw", circle("G3", feed))
             section(f"circle F{feed} cw", circle("G2", feed))
+        section("turn C", turning("C"))
+        section("turn A", turning("A"))
         lines.append(f"G1 X0 Y0 Z{HEIGHT:g} F3000")
         lines.append(f"G3 X{RADIUS:g} Y0 I{RADIUS / 2:g} J0 F3000")
-        section("turn C", ["G1 C90 F6000", "G1 C-90", "G1 C0"])
-        section("turn A", ["G1 A12 F3000", "G1 A-12", "G1 A0"])
         section("stroke Z", [f"G1 Z{HEIGHT - 12:g} F1500", f"G1 Z{HEIGHT:g}"])
         lines.append(f"G3 X0 Y0 I{-RADIUS / 2:g} J0 F3000")
         lines.append("G1 Z0")

@@ -1,0 +1,29 @@
+// Fits a declared machine to a run of the machine when it was healthy.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "diagnosis/diagnosis_case.hpp"
+#include "diagnosis/report/diagnosis.hpp"
+#include "diagnosis/search/selection.hpp"
+
+namespace vcnc {
+
+/// A declared machine fitted to a healthy run.
+struct Commissioning {
+  Machine machine;
+  std::vector<FittedNumber> numbers;  ///< friction and what else was fitted
+  std::vector<std::string> notes;     ///< which friction law each axis got, and why
+  std::vector<SignalFigure> figures;
+  std::vector<std::string> warnings;
+};
+
+/// Fits declared numbers within their tolerances and, axis by axis, the simplest friction law that
+/// does best on held-out data: none, dry and viscous, with break-away, with pre-sliding, with both;
+/// then gains of its loops and feed-forwards, one after the other, where held-out data ask for
+/// them.
+Commissioning commission(const DiagnosisCase& of, const DiagnosisOptions& options = {},
+                         const KeepGoing& keep_going = {});
+
+}  // namespace vcnc

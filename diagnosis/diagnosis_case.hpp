@@ -1,0 +1,19 @@
+// What a diagnosis is made of: a record, its replica, the declared machine, what may be wrong.
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/records/record.hpp"
+#include "diagnosis/replica/replica.hpp"
+#include "diagnosis/search/candidate.hpp"
+
+namespace vcnc {
+
+struct DiagnosisCase {
+  const Record& record;
+  Replica& replica;  ///< of the record
+  const Machine& declared;
+  std::vector<Candidate> candidates;
+};
+
+}  // namespace vcnc

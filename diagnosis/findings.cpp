@@ -1,0 +1,493 @@
+#include "diagnosis/findings.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "diagnosis/search/freed_number.hpp"
+#include "diagnosis/search/generic_laws.hpp"
+#include "diagnosis/search/intervals.hpp"
+#include "model/axes.hpp"
+#include "model/effects/list.hpp"
+
+namespace vcnc {
+namespace {
+
+constexpr double kQuiet = 1.05, kAllExplained = 0.98;
+/// Below both, an effect is of no consequence: RMS of what it does to the contour [um], and to any
+/// signal, of the noise of one sample.
+constexpr double kLeastContour = 0.01, kLeastOfNoise = 0.1;
+/// Part of the noise's chi-square that no law is sought in.
+constexpr double kFloorScatter = 0.04;
+constexpr double kGainAtLimit = 25;  ///< of five standard deviations
+/// A number that costs less chi-square to be as declared is put back.
+constexpr double kUnneeded = 4;
+
+const EffectText* text_of(const std::string& effect) {
+  const EffectText* text = nullptr;
+  for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
+    if (Effect::text.name == effect) text = &Effect::text;
+  });
+  return text;
+}
+
+/// The kind of `vcnc program` that shows an effect best.
+std::string program_for(const std::string& effect) {
+  const EffectText* text = text_of(effect);
+  if (!text) return "";
+  switch (text->showing) {
+    case Showing::circle:
+    case Showing::circle_feeds:
+      return "circle";
+    case Showing::line:
+    case Showing::reversals:
+    case Showing::spin:
+      return "diagnosis";
+    case Showing::standstill:
+    case Showing::corner:
+      return "step";
+    case Showing::s_piece:
+      return "s-piece";
+  }
+  return "";
+}
+
+bool of_measurement(const std::string& effect) {
+  const EffectText* text = text_of(effect);
+  return text && (text->family == Family::probe || text->family == Family::acquisition ||
+                  text->family == Family::setup);
+}
+
+/// RMS of what two predictions differ by where it can be seen: at the probe, else at the linear
+/// axes [um].
+double effect_on_contour(const Evidence& evidence, const Prediction& a, const Prediction& b) {
+  const std::vector<ComparedChannel>& channels = evidence.replica().channels();
+  const auto among = [&](SignalKind kind) {
+    double sum = 0, n = 0;
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      if (channels[c].kind != kind || (kind == SignalKind::position && is_rotary(channels[c].axis)))
+        continue;
+      n = std::max(n, evidence.count(c, Role::both));
+      for (const Block& block : evidence.partition().blocks)
+        for (std::size_t k = block.begin; k < block.end; ++k)
+          if (const double d = a[c][k] - b[c][k]; std::isfinite(d)) sum += d * d;
+    }
+    return n > 0 ? std::sqrt(sum / n) * 1e6 : 0;
+  };
+  const bool probed = std::any_of(channels.begin(), channels.end(),
+                                  [](const auto& c) { return c.kind == SignalKind::deflection; });
+  return among(probed ? SignalKind::deflection : SignalKind::position);
+}
+
+std::string channel_name(const ComparedChannel& c) {
+  constexpr const char* kinds[] = {"command", "position", "twist",       "force", "deflection",
+                                   "cosine",  "sine",     "temperature", "clock"};
+  constexpr const char* xyz[] = {"x", "y", "z"};
+  return fmt::format(
+      "{} {}", kinds[static_cast<int>(c.kind)],
+      c.kind == SignalKind::deflection ? xyz[c.axis % 3] : kAxisNames[c.axis].data());
+}
+
+class Report {
+ public:
+  Report(const DiagnosisCase& of, const Evidence& evidence, const DiagnosisOptions& options,
+         SelectionResult selection, std::optional<PeriodSlip> slip, bool differential)
+      : of_(of),
+        evidence_(evidence),
+        options_(options),
+        selection_(std::move(selection)),
+        slip_(slip),
+        floor_(selection_.floor) {
+    d_.differential = differential;
+    d_.declared = of.declared;
+    d_.found = selection_.found.machine;
+    d_.warnings = of.record.warnings;
+    const NoiseAudit& noise = evidence.noise();
+    d_.warnings.insert(d_.warnings.end(), noise.warnings.begin(), noise.warnings.end());
+    if (selection_.interrupted)
+      d_.warnings.push_back("Interrupted: what was found until then is told.");
+  }
+
+  Diagnosis write() {
+    put_back_unneeded();
+    tell_slip();
+    tell_effects();
+    tell_clamping();
+    tell_noise_lines();
+    std::stable_sort(d_.effects.begin(), d_.effects.end(), [](const auto& a, const auto& b) {
+      return a.contour_error_um > b.contour_error_um;
+    });
+    flag_minor();
+    if (!selection_.interrupted) tell_law();
+    tell_excitation();
+    tell_figures();
+    tell_ladder();
+    judge();
+    return std::move(d_);
+  }
+
+ private:
+  const FittedMachine& found() const { return selection_.found; }
+  double excess(double held_out) const { return std::max(0.0, held_out - floor_); }
+
+  /// A flexible effect has numbers that the record can do without: they go back to the declaration,
+  /// the least needed first.
+  void put_back_unneeded() {
+    FittedMachine& m = selection_.found;
+    for (AddedEffect& a : m.added) {
+      const Candidate& candidate = of_.candidates[a.candidate];
+      const auto is_amplitude = [&](const FreedNumber& n) {
+        return std::none_of(candidate.shape.begin(), candidate.shape.end(), [&](std::size_t s) {
+          return candidate.numbers[s].key == n.number.key;
+        });
+      };
+      while (std::count_if(a.numbers.begin(), a.numbers.end(), is_amplitude) > 1) {
+        const double chi2 = evidence_.chi2(m.residual, Role::both);
+        double least = kUnneeded;
+        std::size_t which = a.numbers.size();
+        Machine without;
+        for (std::size_t i = 0; i < a.numbers.size(); ++i) {
+          if (!is_amplitude(a.numbers[i])) continue;
+          Machine less = m.machine;
+          const std::string& key = a.numbers[i].number.key;
+          move_number(less, key, number_of(of_.declared, key));
+          const double cost =
+              evidence_.chi2(evidence_.residual(evidence_.predict(less)), Role::both) - chi2;
+          if (cost >= least) continue;
+          least = cost, which = i, without = std::move(less);
+        }
+        if (which == a.numbers.size()) break;
+        forget(m, a, which);
+        m.machine = std::move(without);
+        m.prediction = evidence_.predict(m.machine);
+        m.residual = evidence_.residual(m.prediction);
+      }
+    }
+    d_.found = m.machine;
+  }
+
+  /// A number of an added effect leaves the fit, and its column with it.
+  static void forget(FittedMachine& m, AddedEffect& of, std::size_t number) {
+    std::size_t column = number;
+    for (const AddedEffect& a : m.added) {
+      if (&a == &of) break;
+      column += a.numbers.size();
+    }
+    of.numbers.erase(of.numbers.begin() + static_cast<std::ptrdiff_t>(number));
+    if (column < m.columns.size())
+      m.columns.erase(m.columns.begin() + static_cast<std::ptrdiff_t>(column));
+  }
+
+  /// Largest RMS of what two predictions differ by, of the noise of one sample of the signal.
+  double largest_of_noise(const Prediction& a, const Prediction& b) const {
+    double largest = 0;
+    for (std::size_t c = 0; c < a.size(); ++c) {
+      double sum = 0, n = 0;
+      for (const Block& block : evidence_.partition().blocks)
+        for (std::size_t k = block.begin; k < block.end; ++k)
+          if (const double d = a[c][k] - b[c][k]; std::isfinite(d)) sum += d * d, n += 1;
+      const double noise = evidence_.noise().channels[c].rms;
+      if (n > 0 && noise > 0) largest = std::max(largest, std::sqrt(sum / n) / noise);
+    }
+    return largest;
+  }
+
+  /// Whether an effect is too small for a word; then it is noted and put back.
+  bool negligible(const FoundEffect& e, const Machine& without, const Prediction& prediction) {
+    if (e.contour_error_um >= kLeastContour) return false;
+    const double share = largest_of_noise(found().prediction, prediction);
+    if (share >= kLeastOfNoise) return false;
+    d_.notes.push_back(fmt::format(
+        "{} fits a little ({} = {:.3g}) but does nothing that matters: {:.2g} um rms to "
+        "the contour and {:.0f} % of the noise of a sample to any signal.",
+        e.name == "deviation" ? e.place : e.place + "." + e.name, e.numbers.front().key,
+        e.numbers.front().value, e.contour_error_um, 100 * share));
+    for (const FittedNumber& n : e.numbers) move_number(d_.found, n.key, number_of(without, n.key));
+    return true;
+  }
+
+  void tell_effects() {
+    const std::map<std::string, Interval> intervals = intervals_of(evidence_, found());
+    const auto fitted = [&](const FreedNumber& n) {
+      const auto i = intervals.find(n.number.key);
+      const double half = i == intervals.end() ? 0 : i->second.half_width;
+      return FittedNumber{n.number.key, n.value, std::max(n.number.min, n.value - half),
+                          std::min(n.number.max, n.value + half)};
+    };
+    for (const AddedEffect& a : found().added) {
+      const Candidate& candidate = of_.candidates[a.candidate];
+      if (!(a.gain > options_.least_gain)) {
+        withhold(candidate);
+        continue;
+      }
+      FoundEffect e;
+      e.name = candidate.effect;
+      e.place = candidate.place;
+      for (const FreedNumber& n : a.numbers) e.numbers.push_back(fitted(n));
+      e.gain = a.gain;
+      Machine without = found().machine;
+      for (const FreeNumber& n : candidate.numbers)
+        move_number(without, n.key, number_of(of_.declared, n.key));
+      const Prediction less = evidence_.predict(without);
+      e.contour_error_um = effect_on_contour(evidence_, found().prediction, less);
+      if (negligible(e, without, less)) continue;
+      e.acquisition = of_measurement(e.name);
+      for (const std::size_t other : a.class_with)
+        e.class_with.push_back(of_.candidates[other].name());
+      if (!a.class_with.empty()) {
+        e.separating_program = program_for(of_.candidates[a.class_with.front()].effect);
+        if (e.separating_program.empty()) e.separating_program = program_for(e.name);
+      }
+      d_.effects.push_back(std::move(e));
+    }
+    for (const FreedNumber& n : found().nuisances.numbers) {
+      const std::string& key = n.number.key;
+      if (std::find(found().released.begin(), found().released.end(), key) ==
+          found().released.end())
+        continue;
+      FoundEffect e;
+      e.name = "deviation";
+      e.place = key;
+      if (never_quite_absent(key)) {  // "effects.X.scale_error.error_ppm": an effect by its name
+        const std::size_t place = key.find('.') + 1, effect = key.find('.', place) + 1;
+        e.place = key.substr(place, effect - place - 1);
+        e.name = key.substr(effect, key.find('.', effect) - effect);
+      }
+      e.numbers.push_back(fitted(n));
+      Machine without = found().machine;
+      move_number(without, key, n.centre);
+      const Prediction less = evidence_.predict(without);
+      e.contour_error_um = effect_on_contour(evidence_, found().prediction, less);
+      if (negligible(e, without, less)) continue;
+      d_.effects.push_back(std::move(e));
+    }
+  }
+
+  /// An effect that the finished fit can do without, since the declared numbers do as well.
+  void withhold(const Candidate& candidate) {
+    d_.notes.push_back(fmt::format("{} was tried and is not needed.", candidate.name()));
+    for (const FreeNumber& n : candidate.numbers)
+      move_number(d_.found, n.key, number_of(selection_.base.machine, n.key));
+  }
+
+  void tell_slip() {
+    if (!slip_) return;
+    FoundEffect e;
+    e.name = PeriodSlip::text.name;
+    e.place = "probe";
+    const std::string key = "effects.probe.period_slip.";
+    const double within = evidence_.record().period, n = slip_->periods, channel = slip_->channel;
+    e.numbers = {{key + "periods", n, n, n},
+                 {key + "channel", channel, channel, channel},
+                 {key + "start_s", slip_->start, slip_->start - within, slip_->start}};
+    Machine without = found().machine;
+    without.effects.get<PeriodSlip>() = {};
+    const Prediction less = evidence_.predict(without);
+    e.contour_error_um = effect_on_contour(evidence_, found().prediction, less);
+    e.gain = evidence_.chi2(evidence_.residual(less), Role::held_out) -
+             evidence_.chi2(found().residual, Role::held_out);
+    e.acquisition = true;
+    d_.effects.push_back(std::move(e));
+  }
+
+  /// What a number does to the contour by standing where it stands.
+  double moved_by(const FreedNumber& n) const {
+    Machine without = found().machine;
+    move_number(without, n.number.key, n.centre);
+    return effect_on_contour(evidence_, found().prediction, evidence_.predict(without));
+  }
+
+  /// Where the piece was clamped is part of every fit; it is told where it is worth a word.
+  void tell_clamping() {
+    const std::map<std::string, Interval> intervals = intervals_of(evidence_, found());
+    std::map<std::string, FoundEffect> by_effect;
+    for (const FreedNumber& n : found().nuisances.numbers) {
+      const std::string& key = n.number.key;
+      if (!key.starts_with("effects.setup.")) continue;
+      const auto i = intervals.find(key);
+      if (i == intervals.end()) continue;
+      const std::string name = key.substr(14, key.find('.', 14) - 14);
+      const double worth = options_.clamped_um * (name == "piece_tilt" ? 10 : 1);
+      FoundEffect& e = by_effect[name];
+      e.numbers.push_back(
+          {key, n.value, n.value - i->second.half_width, n.value + i->second.half_width});
+      if (std::abs(n.value) < worth || std::abs(n.value) < 2.5 * i->second.half_width) continue;
+      e.name = name;
+      e.place = "setup";
+      e.acquisition = true;
+      e.contour_error_um = std::hypot(e.contour_error_um, moved_by(n));
+    }
+    for (auto& [name, e] : by_effect) {
+      if (e.name.empty()) continue;
+      // Between two runs the piece was clamped anew: that is no finding.
+      if (!d_.differential) {
+        d_.effects.push_back(std::move(e));
+        continue;
+      }
+      std::string text =
+          fmt::format("{}: the piece is not where it was in the reference run", name);
+      for (const FittedNumber& n : e.numbers)
+        if (n.high - n.low < std::abs(n.value))
+          text += fmt::format(", {} {:.1f}", n.key.substr(n.key.find('.', 14) + 1), n.value);
+      d_.notes.push_back(text + ".");
+    }
+  }
+
+  /// A line that no effect of the model makes is a disturbance that does not repeat.
+  void tell_noise_lines() {
+    for (const NoiseLine& line : evidence_.noise().lines) {
+      const bool named =
+          std::any_of(d_.effects.begin(), d_.effects.end(), [&](const FoundEffect& e) {
+            return std::any_of(e.numbers.begin(), e.numbers.end(), [&](const FittedNumber& n) {
+              return n.key.ends_with("frequency_Hz") && std::abs(n.value - line.frequency) < 0.5;
+            });
+          });
+      if (named) continue;
+      const bool mains = std::abs(line.frequency - 50) < 0.4 || std::abs(line.frequency - 60) < 0.4;
+      const bool probe = line.channel.kind == SignalKind::deflection;
+      d_.notes.push_back(fmt::format(
+          "{} holds a disturbance of {:.2f} Hz that does not repeat with the laps, amplitude "
+          "{:.3g} "
+          "{}, {:.0f} times the noise around it{}",
+          channel_name(line.channel), line.frequency,
+          line.channel.kind == SignalKind::force ? line.amplitude : line.amplitude * 1e6,
+          line.channel.kind == SignalKind::force ? "N" : "um", line.strength,
+          mains   ? " (mains)."
+          : probe ? " (vibration between tool and piece)."
+                  : "."));
+    }
+  }
+
+  void flag_minor() {
+    double largest = 0;
+    for (const FoundEffect& e : d_.effects) largest = std::max(largest, e.contour_error_um);
+    for (FoundEffect& e : d_.effects)
+      e.minor = e.contour_error_um < 0.02 * largest && e.contour_error_um < 0.5;
+  }
+
+  void tell_law() {
+    const double left = excess(found().held_out);
+    if (left < options_.law_gain + kFloorScatter * floor_) return;
+    LawFit law = best_law(evidence_, found(), options_);
+    // A law that does better than a single named effect takes its name away.
+    if (found().added.size() == 1) {
+      LawFit instead = best_law(evidence_, selection_.base, options_);
+      const double named = selection_.base.held_out - found().held_out;
+      if (instead.gain > named + options_.law_gain &&
+          instead.gain > 0.5 * (named + std::max(0.0, law.gain))) {
+        d_.notes.push_back(fmt::format("It looks like {}, but {} fits better.",
+                                       of_.candidates[found().added[0].candidate].name(),
+                                       words_of(instead.law.law)));
+        std::erase_if(d_.effects, [](const FoundEffect& e) {
+          return !e.place.empty() && e.place != "setup" && e.name != "deviation";
+        });
+        withdrawn_ = true;
+        law = std::move(instead);
+      }
+    }
+    if (law.gain < std::max(options_.law_gain, options_.least_share * left)) return;
+    law_gain_ = law.gain;
+    d_.law = law.law;
+    d_.found = law.machine;
+  }
+
+  void tell_excitation() {
+    std::map<std::size_t, double> limits;
+    for (const TrialColumns& t : selection_.trials) {
+      const auto at = limits.try_emplace(t.trial.candidate, t.detection_limit).first;
+      at->second = std::min(at->second, t.detection_limit);
+    }
+    double finest = std::numeric_limits<double>::infinity();  // slip of a period that would show
+    for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
+      if (evidence_.replica().channels()[c].kind == SignalKind::deflection)
+        finest = std::min(finest, 5 * std::sqrt(2.0) * evidence_.noise().channels[c].rms /
+                                      of_.declared.probe.signal_period);
+    if (finest < 1) d_.excitation.push_back({"probe.period_slip", finest, true, ""});
+    for (const auto& [c, limit] : limits) {
+      const Candidate& candidate = of_.candidates[c];
+      double typical = 0;
+      for (std::size_t i = 0; i < candidate.numbers.size() && typical == 0; ++i)
+        typical = std::abs(candidate.numbers[i].typical);
+      const double told = limit * std::sqrt(options_.least_gain / kGainAtLimit);
+      Excitation e{candidate.name(), told, told < typical, ""};
+      if (!e.excited) e.program = program_for(candidate.effect);
+      d_.excitation.push_back(std::move(e));
+    }
+  }
+
+  void tell_figures() {
+    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
+    const Prediction before = evidence_.predict(of_.declared), after = evidence_.predict(d_.found);
+    for (const auto& [role, name] :
+         {std::pair{Role::fitted, "fitted laps"}, std::pair{Role::held_out, "held-out laps"}})
+      for (std::size_t c = 0; c < channels.size(); ++c)
+        d_.figures.push_back({channels[c], name, evidence_.rms(before, c, role),
+                              evidence_.rms(after, c, role), evidence_.noise().channels[c].rms});
+  }
+
+  void tell_ladder() {
+    std::vector<double> rms;
+    for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
+      rms.push_back(evidence_.rms(selection_.base.prediction, c, Role::held_out));
+    d_.ladder.push_back({"declared", selection_.base.held_out / std::max(1.0, floor_), rms});
+    for (std::size_t i = 0; i < selection_.rung_chi2.size(); ++i)
+      d_.ladder.push_back({selection_.rung_name[i], selection_.rung_chi2[i] / std::max(1.0, floor_),
+                           selection_.rung_rms[i]});
+  }
+
+  void judge() {
+    const double before = excess(
+        slip_ ? evidence_.chi2(evidence_.residual(evidence_.predict(of_.declared)), Role::held_out)
+              : selection_.base.held_out);
+    const FittedMachine& kept = withdrawn_ ? selection_.base : found();
+    const double after = excess(kept.held_out);
+    const double ratio = 1 + after / std::max(1.0, floor_);
+    const bool named = !d_.effects.empty();
+    d_.explained_share = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
+    const bool excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),
+                                     [](const Excitation& e) { return e.excited; });
+    using enum DiagnosisVerdict;
+    if (evidence_.count(Role::held_out) < 200 || (!excited && !named && ratio < kQuiet))
+      d_.verdict = not_identifiable;
+    else if (d_.law)
+      d_.verdict = named ? partly : unexplained;
+    else if (!evidence_.noise().from_repetitions)
+      d_.verdict = named ? explained : no_deviation;
+    else if (named)
+      d_.verdict = ratio < kQuiet || d_.explained_share > kAllExplained ? explained : partly;
+    else
+      d_.verdict = ratio < kQuiet ? no_deviation : unexplained;
+    if (!d_.differential && !selection_.interrupted && evidence_.noise().from_repetitions &&
+        ratio > options_.model_form) {
+      d_.model_form_share = before > 0 ? std::min(1.0, after / before) : 1;
+      d_.warnings.push_back(fmt::format(
+          "Model form error: {:.0f} % of what the declared machine does not explain is still there "
+          "({:.2f} times the noise). Against the declared machine alone no effect can be called "
+          "the "
+          "cause; compare with a healthy run of the same program.",
+          100 * d_.model_form_share, ratio));
+    }
+  }
+
+  const DiagnosisCase& of_;
+  const Evidence& evidence_;
+  const DiagnosisOptions& options_;
+  SelectionResult selection_;
+  std::optional<PeriodSlip> slip_;
+  double floor_;
+  double law_gain_ = 0;
+  bool withdrawn_ = false;
+  Diagnosis d_;
+};
+
+}  // namespace
+
+Diagnosis findings_of(const DiagnosisCase& of, const Evidence& evidence,
+                      const DiagnosisOptions& options, SelectionResult selection,
+                      std::optional<PeriodSlip> slip, bool differential) {
+  return Report(of, evidence, options, std::move(selection), slip, differential).write();
+}
+
+}  // namespace vcnc

@@ -1,0 +1,38 @@
+// What a search found, as a verdict with effects, figures and intervals.
+//
+// Verdict, with c = chi-square per sample on held-out laps (1 is noise):
+//
+//   NOT IDENTIFIABLE  nothing in the library would show, or there is too little to compare
+//   NO DEVIATION      nothing was found and c < 1.05
+//   EXPLAINED         something was found and c < 1.05, or at least 98 % of the excess is gone
+//   PARTLY            something was found, but more is left
+//   UNEXPLAINED       something repeatable is left that no effect of the library makes
+//
+// In absolute mode c > 1.1 after the fit is model form error: what the model and the machine do
+// differently by themselves. Its share of the excess is told and no effect may be called a cause.
+// Without repeated motions c says nothing and the words are those of what was found.
+//
+// What moves the contour by less than 0.01 um and every signal by less than a tenth of its noise is
+// a note, not an effect.
+//
+// Intervals: 95 %, the larger of the information matrix (inflated by c) and the sandwich with
+// seconds of laps as clusters (White, Econometrica 48 (1980) 817; Liang & Zeger, Biometrika 73
+// (1986) 13), declared tolerances included.
+#pragma once
+
+#include <optional>
+
+#include "diagnosis/diagnosis_case.hpp"
+#include "diagnosis/report/diagnosis.hpp"
+#include "diagnosis/search/evidence.hpp"
+#include "diagnosis/search/period_slip_search.hpp"
+#include "diagnosis/search/selection.hpp"
+
+namespace vcnc {
+
+/// `slip` is a slip of a period that was found beforehand and is part of every prediction.
+Diagnosis findings_of(const DiagnosisCase& of, const Evidence& evidence,
+                      const DiagnosisOptions& options, SelectionResult selection,
+                      std::optional<PeriodSlip> slip, bool differential);
+
+}  // namespace vcnc

@@ -1,0 +1,47 @@
+#include "diagnosis/records/any_record.hpp"
+
+#include <filesystem>
+
+#include "analysis/hdf5_columns.hpp"
+#include "analysis/recording.hpp"
+#include "configs/config.hpp"
+#include "diagnosis/records/import_table.hpp"
+#include "diagnosis/records/record_file.hpp"
+#include "diagnosis/records/record_from_recording.hpp"
+
+namespace vcnc {
+
+Record load_record(const std::string& path, const std::string& map) {
+  std::error_code ignored;
+  const bool folder = std::filesystem::is_directory(path, ignored);
+  if (!map.empty() && !folder && !is_record_file(path)) return import_files(path, map);
+  if (!folder && !std::filesystem::exists(path, ignored))
+    throw MeasurementError(path + ": no such file or folder");
+  if (!folder && !looks_like_hdf5(path))
+    throw MeasurementError(path +
+                           ": is neither a run's folder, a recording nor an imported record; a "
+                           "table needs --map MAP.toml, which says what its columns are");
+  if (!folder && is_record_file(path)) return read_record(path);
+  try {
+    return record_from(RecordingReader(path));
+  } catch (const RecordingError& e) {
+    throw MeasurementError(e.what());
+  }
+}
+
+Machine declared_machine(const std::string& model, const Record& record) {
+  if (!model.empty()) return load_machine(model);
+  if (record.machine_toml.empty())
+    throw MeasurementError(record.source +
+                           ": does not say on which machine it was measured; --model MACHINE.toml "
+                           "is needed");
+  return parse_machine(record.machine_toml, record.source);
+}
+
+std::optional<PieceParams> piece_of(const Machine& machine, const Record& record) {
+  if (!record.piece_toml.empty()) return parse_piece(record.piece_toml, record.source);
+  if (machine.setup.piece.empty()) return std::nullopt;
+  return load_piece(machine.setup.piece);
+}
+
+}  // namespace vcnc

@@ -1,0 +1,384 @@
+#include "diagnosis/records/import_table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "configs/config.hpp"
+#include "configs/spelling.hpp"
+#include "diagnosis/records/record_check.hpp"
+#include "diagnosis/records/signal_name.hpp"
+#include "diagnosis/records/stretches.hpp"
+#include "diagnosis/records/time_base.hpp"
+
+namespace vcnc {
+
+namespace {
+
+using Kind = ImportMap::Kind;
+
+/// A run of fewer samples says nothing.
+constexpr std::size_t kFewestSamples = 100;
+
+class Importer {
+ public:
+  Importer(const MeasuredTable& table, const ImportMap& map, const std::string& map_name,
+           const Machine* declared)
+      : table_(table), map_(map), map_name_(map_name), declared_(declared) {}
+
+  Record record() {
+    find_columns();
+    base_ = find_time_base();
+    record_.source = table_.source;
+    record_.period = base_.period;
+    record_.begin = base_.begin;
+    for (const std::string& note : table_.notes) warn(note);
+    tell_time();
+    if (base_.samples < kFewestSamples)
+      throw MeasurementError(
+          fmt::format("{}: {} samples are too short a run; at least {} are "
+                      "needed",
+                      table_.source, base_.samples, kFewestSamples));
+    for (const ImportMap::Signal& s : map_.signals) add(s);
+    add_twists();
+    check_record(record_, velocities_, declared_);
+    cut();
+    return std::move(record_);
+  }
+
+ private:
+  void warn(const std::string& sentence) { record_.warnings.push_back(sentence); }
+
+  [[noreturn]] void refuse(const KeyLines& lines, const std::string& path, std::string_view key,
+                           const std::string& reason) const {
+    const auto at = lines.find(key);
+    const auto whole = lines.find("");
+    const int line = at != lines.end() ? at->second : whole != lines.end() ? whole->second : 0;
+    throw ConfigError(fmt::format("{}: {}{}: {}",
+                                  line > 0 ? fmt::format("{}:{}", map_name_, line) : map_name_,
+                                  path, key, reason));
+  }
+
+  const MeasuredColumn& find(const std::string& name, int number, const KeyLines& lines,
+                             const std::string& path, std::string_view key) const {
+    if (number > 0) {
+      const auto i = static_cast<std::size_t>(number);
+      if (i > table_.columns.size())
+        refuse(lines, path, key,
+               fmt::format("column {} is not there, {} has {}", number, table_.source,
+                           table_.columns.size()));
+      return usable(table_.columns[i - 1]);
+    }
+    const MeasuredColumn* found = nullptr;
+    for (const MeasuredColumn& c : table_.columns) {
+      if (c.name != name) continue;
+      if (found)
+        refuse(
+            lines, path, key,
+            fmt::format("{} has two columns \"{}\"; say which by its number", table_.source, name));
+      found = &c;
+    }
+    if (!found)
+      refuse(lines, path, key,
+             fmt::format("\"{}\" is no column of {}{}", name, table_.source, suggestion(name)));
+    return usable(*found);
+  }
+
+  const MeasuredColumn& usable(const MeasuredColumn& c) const {
+    if (c.bad_line > 0)
+      throw MeasurementError(
+          fmt::format("{}:{}: \"{}\" in column \"{}\" is no number; if it means "
+                      "that there is none, say so in the map: missing = [\"{}\"]",
+                      table_.source, c.bad_line, c.bad_text, c.name, c.bad_text));
+    if (c.value.empty()) throw MeasurementError(table_.source + ": holds no rows");
+    return c;
+  }
+
+  std::string suggestion(const std::string& name) const {
+    const MeasuredColumn* best = nullptr;
+    std::size_t least = name.size() / 3 + 1;
+    for (const MeasuredColumn& c : table_.columns)
+      if (const std::size_t edits = edit_distance(name, c.name); edits < least)
+        least = edits, best = &c;
+    if (best) return fmt::format("; did you mean \"{}\"?", best->name);
+    constexpr std::size_t kMost = 20;
+    std::string all;
+    for (std::size_t i = 0; i < std::min(kMost, table_.columns.size()); ++i)
+      all += (all.empty() ? "" : ", ") + table_.columns[i].name;
+    return "; it has " + all + (table_.columns.size() > kMost ? ", ..." : "");
+  }
+
+  void find_columns() {
+    std::map<const MeasuredColumn*, std::string> used;
+    const auto use = [&](const MeasuredColumn& c, const KeyLines& lines, const std::string& path,
+                         std::string_view key, const std::string& as) {
+      const auto [known, fresh] = used.emplace(&c, as);
+      if (!fresh)
+        refuse(lines, path, key,
+               fmt::format("column \"{}\" is used as {} already", c.name, known->second));
+      rows_ = rows_ == 0 ? c.value.size() : rows_;
+      if (c.value.size() != rows_)
+        refuse(lines, path, key,
+               fmt::format("column \"{}\" has {} rows, the others have {}", c.name, c.value.size(),
+                           rows_));
+    };
+    const ImportMap::Time& t = map_.time;
+    if (t.rate == 0) {
+      const std::string_view key = t.number > 0 ? "number" : "column";
+      time_ = &find(t.column, t.number, t.lines, "time.", key);
+      use(*time_, t.lines, "time.", key, "time");
+    }
+    for (const ImportMap::Signal& s : map_.signals) {
+      const std::string_view key = s.number > 0 ? "number" : "column";
+      columns_.push_back(&find(s.column, s.number, s.lines, "signals.", key));
+      use(*columns_.back(), s.lines, "signals.", key,
+          fmt::format("{}{}", to_string(s.kind), s.axis.empty() ? "" : " of " + s.axis));
+    }
+  }
+
+  TimeBase find_time_base() const {
+    if (!time_) return uniform_time_base(rows_, 1 / map_.time.rate);
+    const MeasuredUnit* unit = find_measured_unit(map_.time.unit);
+    std::vector<double> seconds = time_->value;
+    for (double& v : seconds) v *= unit->factor;
+    return time_base(seconds, map_.time.jitter, table_);
+  }
+
+  void tell_time() {
+    if (base_.gaps > 0)
+      warn(fmt::format("{} samples are missing in {} gap{} and stay missing", base_.lost,
+                       base_.gaps, base_.gaps == 1 ? "" : "s"));
+    if (base_.jitter > 0.01 * base_.period)
+      warn(
+          fmt::format("time stamps jitter by {:.3g} us rms, at most {:.3g} us, of a period of "
+                      "{:.6g} us",
+                      base_.jitter * 1e6, base_.worst * 1e6, base_.period * 1e6));
+    const double rate = 1 / base_.period;
+    if (rate < 50)
+      warn(fmt::format("{:.4g} samples per second are too few for effects of the drives", rate));
+    if (rate > 1e6)
+      warn(fmt::format("{:.4g} samples per second are unusually many; check time.unit", rate));
+  }
+
+  void add(const ImportMap::Signal& s) {
+    const MeasuredColumn& column = *columns_[static_cast<std::size_t>(&s - map_.signals.data())];
+    MeasuredSignal signal;
+    const SignalPlace place = place_of(map_, s);
+    signal.axis = place.axis;
+    signal.source = column.name;
+    signal.value.assign(base_.samples, kMissing);
+    std::size_t missing = 0;
+    for (std::size_t i = 0; i < rows_; ++i) {
+      signal.value[base_.index[i]] = to_si(s, column.value[i]);
+      missing += !std::isfinite(column.value[i]);
+    }
+    if (missing == rows_)
+      refuse(s.lines, "signals.", s.number > 0 ? "number" : "column",
+             fmt::format("column \"{}\" holds no value", column.name));
+    if (missing > 0)
+      warn(fmt::format("\"{}\": {} of {} values are missing and stay missing", column.name, missing,
+                       rows_));
+    switch (s.kind) {
+      case Kind::command:
+        signal.kind = SignalKind::command;
+        break;
+      case Kind::position:
+      case Kind::motor_position:
+      case Kind::load_position:
+        positions_[place.axis][s.kind] = record_.signals.size();
+        signal.kind = SignalKind::position;
+        break;
+      case Kind::twist:
+        signal.kind = SignalKind::twist;
+        break;
+      case Kind::velocity:
+        velocities_.push_back(std::move(signal));
+        return;
+      case Kind::force:
+        signal.kind = SignalKind::force;
+        break;
+      case Kind::deflection:
+        signal.kind = SignalKind::deflection;
+        break;
+      case Kind::cosine:
+        signal.kind = SignalKind::cosine;
+        break;
+      case Kind::sine:
+        signal.kind = SignalKind::sine;
+        break;
+      case Kind::temperature:
+        signal.kind = SignalKind::temperature;
+        signal.axis = temperatures_++;
+        if (signal.axis >= kAxisCount)
+          refuse(s.lines, "signals.", "kind", fmt::format("more than {} temperatures", kAxisCount));
+        break;
+      case Kind::clock:
+        signal.kind = SignalKind::clock;
+        break;
+    }
+    record_.signals.push_back(std::move(signal));
+  }
+
+  /// Of two positions of one axis the second becomes the twist.
+  void add_twists() {
+    std::set<std::size_t> gone;
+    for (const auto& [axis, of] : positions_) {
+      if (of.size() < 2) continue;
+      const bool motor = of.contains(Kind::motor_position);
+      const bool load = of.contains(Kind::load_position);
+      // position is that of the motor, unless the motor has a column of its own.
+      const std::size_t m = motor ? of.at(Kind::motor_position) : of.at(Kind::position);
+      const std::size_t l = load ? of.at(Kind::load_position) : of.at(Kind::position);
+      const std::size_t closed = of.contains(Kind::position) ? of.at(Kind::position) : m;
+      MeasuredSignal twist;
+      twist.kind = SignalKind::twist;
+      twist.axis = axis;
+      twist.source = record_.signals[l].source + " - " + record_.signals[m].source;
+      for (std::size_t i = 0; i < base_.samples; ++i)
+        twist.value.push_back(record_.signals[l].value[i] - record_.signals[m].value[i]);
+      gone.insert(closed == m ? l : m);
+      record_.signals.push_back(std::move(twist));
+    }
+    for (auto i = gone.rbegin(); i != gone.rend(); ++i)
+      record_.signals.erase(record_.signals.begin() + static_cast<std::ptrdiff_t>(*i));
+  }
+
+  void cut() {
+    if (!map_.laps.empty())
+      cut_by_times();
+    else if (!map_.lap_column.empty())
+      cut_by_column();
+    else if (map_.detect_laps)
+      record_.stretches = stretches_of(record_);
+    std::map<int, int> repetitions;
+    for (const Stretch& s : record_.stretches) ++repetitions[s.condition];
+    const bool repeated = std::any_of(repetitions.begin(), repetitions.end(),
+                                      [](const auto& r) { return r.second > 1; });
+    if (!repeated)
+      warn("no motion is repeated: noise can only be estimated from the residual itself");
+  }
+
+  void cut_by_times() {
+    std::map<std::string, std::pair<int, int>> known;  // condition: number, repetitions
+    for (const ImportMap::Lap& lap : map_.laps) {
+      const double from = (lap.from - base_.begin) / base_.period;
+      const double to = (lap.to - base_.begin) / base_.period;
+      const auto last = static_cast<double>(base_.samples);
+      if (to <= 0 || from >= last)
+        refuse(lap.lines, "laps.", "from_s",
+               fmt::format("the lap lies outside the run, {:.6g} .. {:.6g} s", base_.begin,
+                           base_.begin + (last - 1) * base_.period));
+      const std::string name = lap.condition.empty()
+                                   ? fmt::format("lap {}", record_.stretches.size() + 1)
+                                   : lap.condition;
+      auto& [number, repetition] =
+          known.emplace(name, std::pair(static_cast<int>(known.size()), 0)).first->second;
+      add_stretch(static_cast<std::size_t>(std::clamp(std::round(from), 0.0, last)),
+                  static_cast<std::size_t>(std::clamp(std::round(to), 0.0, last)), number,
+                  repetition++, name);
+    }
+  }
+
+  void add_stretch(std::size_t begin, std::size_t end, int condition, int repetition,
+                   const std::string& label) {
+    if (end > begin) record_.stretches.push_back({begin, end, condition, repetition, label});
+  }
+
+  void cut_by_column() {
+    const MeasuredColumn& laps = find(map_.lap_column, 0, map_.lines, "", "lap_column");
+    const MeasuredColumn* conditions =
+        map_.condition_column.empty()
+            ? nullptr
+            : &find(map_.condition_column, 0, map_.lines, "", "condition_column");
+    for (const MeasuredColumn* c : {&laps, conditions})
+      if (c && c->value.size() != rows_)
+        refuse(map_.lines, "", "lap_column",
+               fmt::format("column \"{}\" has {} rows, the others have {}", c->name,
+                           c->value.size(), rows_));
+    std::map<double, std::pair<int, int>> known;
+    const auto differ = [](double a, double b) {
+      return std::isfinite(a) || std::isfinite(b) ? !(a == b) : false;
+    };
+    std::size_t begin = 0;
+    for (std::size_t i = 1; i <= rows_; ++i) {
+      const bool ends = i == rows_ || differ(laps.value[i], laps.value[i - 1]) ||
+                        (conditions && differ(conditions->value[i], conditions->value[i - 1]));
+      if (!ends) continue;
+      if (std::isfinite(laps.value[begin])) {
+        const double of = conditions ? conditions->value[begin] : 0;
+        auto& [number, repetition] =
+            known.emplace(std::isfinite(of) ? of : 0, std::pair(static_cast<int>(known.size()), 0))
+                .first->second;
+        add_stretch(base_.index[begin], base_.index[i - 1] + 1, number, repetition++,
+                    conditions ? fmt::format("{} {:g}", conditions->name, of) : "lap");
+      }
+      begin = i;
+    }
+  }
+
+  const MeasuredTable& table_;
+  const ImportMap& map_;
+  const std::string& map_name_;
+  const Machine* declared_;
+  const MeasuredColumn* time_ = nullptr;
+  std::vector<const MeasuredColumn*> columns_;  // of each signal of the map
+  std::size_t rows_ = 0, temperatures_ = 0;
+  std::map<std::size_t, std::map<Kind, std::size_t>> positions_;  // axis: kind: signal
+  std::vector<MeasuredSignal> velocities_;                        // for checks only
+  TimeBase base_;
+  Record record_;
+};
+
+}  // namespace
+
+Record import_table(const MeasuredTable& table, const ImportMap& map, const std::string& map_name,
+                    const Machine* declared) {
+  return Importer(table, map, map_name, declared).record();
+}
+
+Record import_files(const std::string& table, const std::string& map) {
+  const ImportMap read = load_import_map(map);
+  std::optional<Machine> declared;
+  if (!read.machine.empty()) declared = load_machine(read.machine);
+  const TextFormat format{.separator = read.separator, .missing = read.missing};
+  Record record =
+      import_table(read_measured_table(table, format), read, map, declared ? &*declared : nullptr);
+  if (declared) {
+    record.machine_toml = to_toml(*declared);
+    if (!declared->setup.piece.empty())
+      record.piece_toml = to_toml(load_piece(declared->setup.piece));
+  }
+  return record;
+}
+
+std::string describe(const Record& record) {
+  std::string text =
+      fmt::format("{}: {} samples in {:.3f} s, {:.6g} Hz\n", record.source, record.samples(),
+                  static_cast<double>(record.samples()) * record.period, 1 / record.period);
+  for (const MeasuredSignal& s : record.signals) {
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    std::size_t there = 0;
+    for (const double v : s.value)
+      if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v), ++there;
+    text += fmt::format("  {:<16} from \"{}\": {:.6g} .. {:.6g} in SI", signal_name(s.kind, s.axis),
+                        s.source, low, high);
+    if (s.resolution > 0) text += fmt::format(", in steps of {:.3g}", s.resolution);
+    if (there < s.value.size()) text += fmt::format(", {} missing", s.value.size() - there);
+    text += "\n";
+  }
+  std::map<int, std::pair<std::string, int>> conditions;
+  for (const Stretch& s : record.stretches) {
+    auto& [label, count] = conditions[s.condition];
+    label = s.label;
+    ++count;
+  }
+  for (const auto& [number, of] : conditions)
+    text += fmt::format("  {}: {} lap{}\n", of.first, of.second, of.second == 1 ? "" : "s");
+  return text;
+}
+
+}  // namespace vcnc

@@ -1,0 +1,309 @@
+#include "diagnosis/records/measured_table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+
+#include "analysis/hdf5_columns.hpp"
+#include "analysis/recording.hpp"
+#include "diagnosis/records/record.hpp"
+
+namespace vcnc {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Separator = ImportMap::Separator;
+
+constexpr std::uintmax_t kLargestTable = 4'000'000'000;
+constexpr std::size_t kMostColumns = 10'000;
+
+constexpr bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+std::string shortened(std::string_view text) {
+  constexpr std::size_t kMost = 40;
+  std::string result;
+  for (const char c : text.substr(0, kMost))
+    result += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
+  return text.size() > kMost ? result + "..." : result;
+}
+
+std::optional<double> number(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  if (text.empty() || !(text[0] == '-' || text[0] == '.' || (text[0] >= '0' && text[0] <= '9')))
+    return std::nullopt;
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    return std::nullopt;
+  return value;
+}
+
+/// "1,5": a number, if the comma were a point.
+bool has_decimal_comma(std::string_view text) {
+  const std::size_t comma = text.find(',');
+  if (comma == text.npos || text.find(',', comma + 1) != text.npos) return false;
+  std::string pointed(text);
+  pointed[comma] = '.';
+  return number(pointed).has_value();
+}
+
+class TextTable {
+ public:
+  TextTable(std::string_view text, const std::string& name, const TextFormat& format)
+      : text_(text), name_(name), format_(format), separator_(format.separator) {
+    table_.source = name;
+  }
+
+  MeasuredTable read() {
+    if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
+    if (text_.substr(0, 2) == "\xFF\xFE" || text_.substr(0, 2) == "\xFE\xFF")
+      fail(1, "is UTF-16 text; save it as UTF-8 or ASCII");
+    while (!text_.empty()) take_line();
+    if (table_.rows() == 0) throw MeasurementError(name_ + ": holds no numbers");
+    return std::move(table_);
+  }
+
+ private:
+  [[noreturn]] void fail(std::size_t line, const std::string& reason) const {
+    throw MeasurementError(fmt::format("{}:{}: {}", name_, line, reason));
+  }
+
+  void take_line() {
+    const std::size_t end = std::min(text_.find('\n'), text_.size());
+    const std::string_view line = trimmed_end(text_.substr(0, end));
+    text_.remove_prefix(std::min(end + 1, text_.size()));
+    ++line_;
+    const std::string_view content = trimmed(line);
+    if (content.empty()) return;
+    if (content.front() == '#' || content.front() == '%') {
+      if (!begun_) remark_ = std::string(trimmed(content.substr(1)));
+      return;
+    }
+    if (separator_ == Separator::any) separator_ = told_separator(line);
+    split(line);
+    if (!begun_)
+      begin();
+    else if (!heading_rows_over_ && is_heading())
+      table_.notes.push_back(
+          fmt::format("line {} holds no numbers and was taken for units, which "
+                      "come from the map",
+                      line_));
+    else
+      take_row();
+  }
+
+  static std::string_view trimmed_end(std::string_view line) {
+    while (!line.empty() && (line.back() == '\r' || line.back() == '\0')) line.remove_suffix(1);
+    return line;
+  }
+
+  static Separator told_separator(std::string_view line) {
+    std::array<std::size_t, 3> count{};
+    bool quoted = false;
+    for (const char c : line) {
+      if (c == '"') quoted = !quoted;
+      if (quoted) continue;
+      count[0] += c == ';';
+      count[1] += c == '\t';
+      count[2] += c == ',';
+    }
+    // A decimal comma stands beside semicolons or tabs, never the other way round.
+    if (count[0] > 0) return Separator::semicolon;
+    if (count[1] > 0) return Separator::tab;
+    if (count[2] > 0) return Separator::comma;
+    return Separator::space;
+  }
+
+  char separator_sign() const {
+    switch (separator_) {
+      case Separator::semicolon:
+        return ';';
+      case Separator::tab:
+        return '\t';
+      case Separator::space:
+        return ' ';
+      case Separator::comma:
+      case Separator::any:
+        break;
+    }
+    return ',';
+  }
+
+  void split(std::string_view line) {
+    fields_.clear();
+    const char sign = separator_sign();
+    std::size_t i = 0;
+    const auto between = [&](char c) { return sign == ' ' ? c == ' ' || c == '\t' : c == sign; };
+    const auto blank = [&](char c) { return is_space(c) && c != sign; };
+    while (true) {
+      while (i < line.size() && (sign == ' ' ? is_space(line[i]) : blank(line[i]))) ++i;
+      if (sign == ' ' && i >= line.size()) break;
+      std::string field;
+      if (i < line.size() && line[i] == '"') {
+        ++i;
+        for (;; ++i) {
+          if (i >= line.size()) fail(line_, "a quote is not closed");
+          if (line[i] == '"' && i + 1 < line.size() && line[i + 1] == '"')
+            field += line[i++];
+          else if (line[i] == '"')
+            break;
+          else
+            field += line[i];
+        }
+        ++i;
+        while (i < line.size() && blank(line[i])) ++i;
+        if (i < line.size() && !between(line[i]))
+          fail(line_, "text behind a closing quote; expected a separator");
+      } else {
+        const std::size_t from = i;
+        while (i < line.size() && !between(line[i])) ++i;
+        field = trimmed(line.substr(from, i - from));
+      }
+      fields_.push_back(std::move(field));
+      if (fields_.size() > kMostColumns)
+        fail(line_, fmt::format("more than {} values in one line", kMostColumns));
+      if (i >= line.size()) break;
+      ++i;
+    }
+  }
+
+  bool missing(std::string_view text) const {
+    if (text.empty()) return true;
+    for (const std::string& own : format_.missing)
+      if (text == own) return true;
+    for (const std::string_view known : {"nan", "NaN", "NAN", "NA", "N/A", "n/a", "null", "NULL"})
+      if (text == known) return true;
+    return false;
+  }
+
+  bool is_heading() const {
+    bool text = false;
+    for (const std::string& f : fields_) {
+      if (number(f)) return false;
+      text = text || (!missing(f) && !has_decimal_comma(f));
+    }
+    return text;
+  }
+
+  void begin() {
+    begun_ = true;
+    const bool heading = is_heading();
+    std::vector<std::string> names = fields_;
+    if (!heading) {
+      const std::size_t columns = fields_.size();
+      const std::vector<std::string> values = std::move(fields_);
+      if (!remark_.empty()) split(remark_);
+      if (remark_.empty() || fields_.size() != columns || !is_heading()) {
+        fields_.clear();
+        for (std::size_t i = 0; i < columns; ++i) fields_.push_back(std::to_string(i + 1));
+      }
+      names = fields_;
+      fields_ = values;
+    }
+    for (std::string& n : names) table_.columns.emplace_back().name = std::move(n);
+    if (heading && table_.columns.size() > 1 && table_.columns.back().name.empty())
+      table_.columns.pop_back();  // a separator at the end of every line
+    if (!heading) take_row();
+  }
+
+  void take_row() {
+    heading_rows_over_ = true;
+    const std::size_t expected = table_.columns.size();
+    if (fields_.size() == expected + 1 && fields_.back().empty()) fields_.pop_back();
+    if (fields_.size() != expected) {
+      const bool commas = separator_ == Separator::comma && fields_.size() > expected;
+      fail(line_, fmt::format("{} values, expected {}{}", fields_.size(), expected,
+                              commas ? "; if the numbers have decimal commas, export them with "
+                                       "points"
+                                     : ""));
+    }
+    for (std::size_t i = 0; i < expected; ++i) {
+      MeasuredColumn& column = table_.columns[i];
+      const std::string& text = fields_[i];
+      const auto value = missing(text) ? std::optional(kMissing) : number(text);
+      if (!value && has_decimal_comma(text))
+        fail(line_,
+             fmt::format("\"{}\" in column \"{}\" has a decimal comma; export the table with "
+                         "decimal points",
+                         shortened(text), shortened(column.name)));
+      if (!value && column.bad_line == 0) {
+        column.bad_line = line_;
+        column.bad_text = shortened(text);
+      }
+      column.value.push_back(value.value_or(kMissing));
+    }
+    table_.line.push_back(line_);
+  }
+
+  std::string_view text_;
+  const std::string& name_;
+  const TextFormat& format_;
+  Separator separator_;
+  MeasuredTable table_;
+  std::vector<std::string> fields_;
+  std::string remark_;
+  std::size_t line_ = 0;
+  bool begun_ = false, heading_rows_over_ = false;
+};
+
+std::string read_text(const std::string& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error))
+    throw MeasurementError(path + ": is a folder, expected a table (CSV or HDF5)");
+  if (!fs::exists(path, error)) throw MeasurementError(path + ": no such file");
+  if (!fs::is_regular_file(path, error))
+    throw MeasurementError(path + ": is not a regular file, expected a table (CSV or HDF5)");
+  const std::uintmax_t size = fs::file_size(path, error);
+  if (error) throw MeasurementError(path + ": cannot be read: " + error.message());
+  if (size > kLargestTable)
+    throw MeasurementError(path + ": is larger than 4 GB, too large for a text table; use HDF5");
+  std::ifstream in(path, std::ios::binary);
+  std::string text(size, '\0');
+  if (!in || !in.read(text.data(), static_cast<std::streamsize>(size)))
+    throw MeasurementError(path + ": cannot be read");
+  return text;
+}
+
+}  // namespace
+
+std::string MeasuredTable::place(std::size_t row) const {
+  return row < line.size() ? fmt::format("{}:{}", source, line[row])
+                           : fmt::format("{}: row {}", source, row + 1);
+}
+
+MeasuredTable parse_text_table(std::string_view text, const std::string& name,
+                               const TextFormat& format) {
+  return TextTable(text, name, format).read();
+}
+
+MeasuredTable read_measured_table(const std::string& path, const TextFormat& format) {
+  if (!looks_like_hdf5(path)) return parse_text_table(read_text(path), path, format);
+  MeasuredTable table;
+  table.source = path;
+  try {
+    for (Hdf5Column& column : read_hdf5_columns(path))
+      table.columns.push_back({.name = std::move(column.name), .value = std::move(column.value)});
+  } catch (const RecordingError& e) {
+    throw MeasurementError(e.what());
+  }
+  for (MeasuredColumn& c : table.columns)
+    for (double& v : c.value)
+      if (!std::isfinite(v)) v = kMissing;
+  if (table.columns.empty()) throw MeasurementError(path + ": holds no columns of numbers");
+  return table;
+}
+
+}  // namespace vcnc

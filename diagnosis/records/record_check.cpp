@@ -1,0 +1,432 @@
+#include "diagnosis/records/record_check.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "diagnosis/records/measured_table.hpp"
+#include "diagnosis/records/signal_name.hpp"
+
+namespace vcnc {
+
+namespace {
+
+using Series = std::vector<double>;
+
+constexpr double kSmoothing = 10e-3;  ///< [s] of all derivatives here
+constexpr double kBelongs = 0.7;      ///< correlation of what belongs together
+constexpr double kFits = 0.95;        ///< ... of what certainly does
+constexpr double kSlope = 0.1;        ///< how far a slope may be off 1
+constexpr std::size_t kFewestSteps = 500;
+
+struct Spread {
+  double low = HUGE_VAL, high = -HUGE_VAL;
+  std::size_t count = 0;
+  double span() const { return count > 0 ? high - low : 0; }
+};
+
+Spread spread_of(const Series& value) {
+  Spread s;
+  for (const double v : value)
+    if (std::isfinite(v)) s.low = std::min(s.low, v), s.high = std::max(s.high, v), ++s.count;
+  return s;
+}
+
+bool constant(const Series& value) { return !(spread_of(value).span() > 0); }
+
+/// Mean over 2 half + 1 samples; NaN where one of them is missing.
+Series smoothed(const Series& value, std::size_t half) {
+  const std::size_t n = value.size();
+  Series result(n, kMissing);
+  double sum = 0;
+  std::size_t there = 0;
+  const std::size_t width = 2 * half + 1;
+  for (std::size_t k = 0; k < n; ++k) {
+    if (std::isfinite(value[k])) sum += value[k], ++there;
+    if (k >= width && std::isfinite(value[k - width])) sum -= value[k - width], --there;
+    if (k + 1 >= width && there == width) result[k - half] = sum / static_cast<double>(width);
+  }
+  return result;
+}
+
+Series derivative(const Series& value, double period) {
+  Series result(value.size(), kMissing);
+  for (std::size_t k = 1; k + 1 < value.size(); ++k)
+    result[k] = (value[k + 1] - value[k - 1]) / (2 * period);
+  return result;
+}
+
+/// Slope and correlation of y over x, both about their means.
+struct Relation {
+  double slope = 0, correlation = 0;
+  bool known = false;
+};
+
+Relation relate(const Series& x, const Series& y) {
+  double mx = 0, my = 0, n = 0;
+  for (std::size_t k = 0; k < x.size(); ++k)
+    if (std::isfinite(x[k]) && std::isfinite(y[k])) mx += x[k], my += y[k], ++n;
+  if (n < 10) return {};
+  mx /= n, my /= n;
+  double xx = 0, yy = 0, xy = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    if (!std::isfinite(x[k]) || !std::isfinite(y[k])) continue;
+    xx += (x[k] - mx) * (x[k] - mx);
+    yy += (y[k] - my) * (y[k] - my);
+    xy += (x[k] - mx) * (y[k] - my);
+  }
+  if (!(xx > 0 && yy > 0)) return {};
+  return {xy / xx, xy / std::sqrt(xx * yy), true};
+}
+
+bool fits(const Relation& r) {
+  return r.known && r.correlation > kFits && std::abs(r.slope - 1) <= kSlope;
+}
+
+/// A usual mistake that makes a factor of this size.
+std::string mistake(double factor) {
+  struct Known {
+    double factor;
+    const char* text;
+  };
+  constexpr double kTurn = 2 * kPi;
+  static const std::array known{
+      Known{1e3, "1000: m and mm, or s and ms"},
+      Known{1e6, "1e6: m and um, or s and us"},
+      Known{1 / kDegree, "57.3: radians and degrees"},
+      Known{kTurn, "2 pi: turns and radians"},
+      Known{360, "360: turns and degrees"},
+      Known{60, "60: per second and per minute"},
+      Known{6e4, "60000: m/s and mm/min"},
+      Known{25.4, "25.4: inches and mm"},
+      Known{2, "2: diameter and radius, or periods and half periods"},
+  };
+  for (const Known& k : known)
+    for (const double f : {k.factor, 1 / k.factor})
+      if (std::abs(std::abs(factor) / f - 1) < 0.03)
+        return fmt::format(" (a factor of {})", k.text);
+  return "";
+}
+
+class Checker {
+ public:
+  Checker(Record& record, const std::vector<MeasuredSignal>& velocities, const Machine* declared)
+      : record_(record), velocities_(velocities), declared_(declared), half_(half_width(record)) {}
+
+  void run() {
+    check_values();
+    for (const MeasuredSignal& v : velocities_) check_velocity(v);
+    for (const MeasuredSignal& s : record_.signals) {
+      if (s.kind == SignalKind::position) check_command(s);
+      if (s.kind == SignalKind::position || s.kind == SignalKind::command) check_range(s);
+    }
+    for (const MeasuredSignal& s : record_.signals)
+      if (s.kind == SignalKind::force) check_force(s);
+  }
+
+ private:
+  /// Of the smoothing, but never more than a fiftieth of the run.
+  static std::size_t half_width(const Record& record) {
+    const double wanted = std::round(kSmoothing / 2 / record.period);
+    return static_cast<std::size_t>(
+        std::clamp(wanted, 1.0, std::max(1.0, static_cast<double>(record.samples()) / 100)));
+  }
+
+  void warn(const std::string& sentence) { record_.warnings.push_back(sentence); }
+  [[noreturn]] void refuse(const std::string& sentence) const {
+    throw MeasurementError(record_.source + ": " + sentence);
+  }
+  static std::string name(const MeasuredSignal& s) {
+    return fmt::format("\"{}\" ({})", s.source, signal_name(s.kind, s.axis));
+  }
+
+  static std::string speed_name(const MeasuredSignal& s) {
+    return fmt::format("\"{}\" (velocity {})", s.source, kAxisNames[s.axis]);
+  }
+
+  /// Smoothed velocity of a position.
+  Series speed_of(const MeasuredSignal& s) const {
+    return smoothed(derivative(s.value, record_.period), half_);
+  }
+  const MeasuredSignal* motion(std::size_t axis) const {
+    const MeasuredSignal* s = record_.find(SignalKind::position, axis);
+    return s ? s : record_.find(SignalKind::command, axis);
+  }
+
+  void check_values() {
+    std::size_t compared = 0, still = 0;
+    for (MeasuredSignal& s : record_.signals) {
+      const bool is_constant = constant(s.value);
+      const bool raw = s.kind == SignalKind::cosine || s.kind == SignalKind::sine;
+      if (is_compared(s.kind) || raw) ++compared, still += is_constant;
+      if (is_constant && s.kind != SignalKind::temperature)
+        warn(fmt::format("{} is constant; nothing can be learnt from it", name(s)));
+      if (is_constant) continue;
+      s.resolution = resolution_of(s.value);
+      const double steps = s.resolution > 0 ? spread_of(s.value).span() / s.resolution : HUGE_VAL;
+      if (steps < kFewestSteps && s.kind != SignalKind::temperature)
+        warn(fmt::format("{} comes in {:.0f} coarse steps of {:.3g} (SI)", name(s), steps,
+                         s.resolution));
+      if (s.kind == SignalKind::force || s.kind == SignalKind::deflection || raw) check_ends(s);
+    }
+    if (compared == 0)
+      refuse(
+          "no signal can be compared with a model: at least one position, twist, force, "
+          "deflection, or sine and cosine is needed");
+    if (compared == still)
+      refuse("all measured signals are constant; nothing can be learnt from the run");
+    const double seconds = static_cast<double>(record_.samples()) * record_.period;
+    if (seconds < 1)
+      warn(
+          fmt::format("a run of {:.3g} s is short; effects of the drives need some seconds of "
+                      "motion",
+                      seconds));
+  }
+
+  /// Equal extremes in a row, many more than a quantised signal has there by itself.
+  void check_ends(const MeasuredSignal& s) {
+    const Spread spread = spread_of(s.value);
+    for (const auto& [extreme, inside] : {std::pair(spread.high, -1.0), {spread.low, 1.0}}) {
+      std::size_t at = 0, run = 0, longest = 0, beside = 0;
+      for (const double v : s.value) {
+        const bool hit = v == extreme;
+        run = hit ? run + 1 : 0;
+        at += hit;
+        longest = std::max(longest, run);
+        const double depth = (v - extreme) * inside;
+        beside += s.resolution > 0 && depth > 0 && depth < 3.5 * s.resolution;
+      }
+      const bool often = 1000 * at >= spread.count;
+      if (longest >= 5 && often && 3 * at > 5 * beside)
+        warn(fmt::format("{} stays at its {} value {:.4g} in {} samples: it may be saturated",
+                         name(s), inside < 0 ? "largest" : "least", extreme, at));
+    }
+  }
+
+  void check_velocity(const MeasuredSignal& s) {
+    const MeasuredSignal* own = motion(s.axis);
+    if (constant(s.value)) warn(speed_name(s) + " is constant");
+    if (!own || constant(own->value) || constant(s.value)) return;
+    const Series measured = smoothed(s.value, half_);
+    const Relation r = relate(speed_of(*own), measured);
+    if (!r.known) return;
+    const bool belongs = std::abs(r.correlation) >= kBelongs;
+    if (belongs && std::abs(r.slope - 1) <= kSlope) return;
+    if (fits(relate(speed_of(s), smoothed(own->value, half_))))
+      refuse(fmt::format("{} is the derivative of {}: the columns are swapped", name(*own),
+                         speed_name(s)));
+    if (belongs) {
+      const std::string found = fmt::format("{} is {:.4g} times the derivative of {}{}",
+                                            speed_name(s), r.slope, name(*own), mistake(r.slope));
+      if (!(r.slope > 0.75 && r.slope < 1.33))
+        refuse(found + "; check unit, scale and sign of the two columns");
+      warn(found);
+      return;
+    }
+    for (std::size_t other = 0; other < kAxisCount; ++other) {
+      const MeasuredSignal* o = motion(other);
+      if (o && other != s.axis && !constant(o->value) && fits(relate(speed_of(*o), measured)))
+        refuse(fmt::format("{} is the derivative of {}, not of {}: the columns are swapped",
+                           speed_name(s), name(*o), name(*own)));
+    }
+    refuse(
+        fmt::format("{} is not the derivative of {} (correlation {:.2f}); one of the columns is "
+                    "another signal",
+                    speed_name(s), name(*own), r.correlation));
+  }
+
+  void check_command(const MeasuredSignal& s) {
+    const MeasuredSignal* own = record_.find(SignalKind::command, s.axis);
+    if (!own || constant(own->value) || constant(s.value)) return;
+    const Series moved = speed_of(s);
+    const Relation r = relate(speed_of(*own), moved);
+    if (!r.known) return;
+    if (r.correlation < -kBelongs)
+      refuse(fmt::format("{} moves against {}; check the signs", name(s), name(*own)));
+    if (r.correlation >= kBelongs) {
+      if (std::abs(r.slope - 1) <= 2 * kSlope) return;
+      const std::string found = fmt::format("{} moves {:.4g} times as far as {}{}", name(s),
+                                            r.slope, name(*own), mistake(r.slope));
+      if (r.slope > 0.5 && r.slope < 1.9)
+        warn(found);
+      else
+        refuse(found + "; check unit and scale of the two columns");
+      return;
+    }
+    for (std::size_t other = 0; other < kAxisCount; ++other) {
+      const MeasuredSignal* c = record_.find(SignalKind::command, other);
+      if (c && other != s.axis && !constant(c->value) && fits(relate(speed_of(*c), moved)))
+        refuse(fmt::format("{} follows {}, not {}: the columns are swapped", name(s), name(*c),
+                           name(*own)));
+    }
+    warn(fmt::format("{} hardly follows {} (correlation of their speeds {:.2f})", name(s),
+                     name(*own), r.correlation));
+  }
+
+  void check_range(const MeasuredSignal& s) {
+    if (!declared_) return;
+    const AxisLimits& l = declared_->axes[s.axis].limits;
+    const Spread spread = spread_of(s.value);
+    const double travel = l.max - l.min, share = spread.span() / travel;
+    const char* unit = is_rotary(s.axis) ? "rad" : "m";
+    if (share > 1.5)
+      refuse(
+          fmt::format("{} spans {:.4g} {}, the declared travel is {:.4g} {}{}; check unit and "
+                      "scale",
+                      name(s), spread.span(), unit, travel, unit, likely(share, s.axis)));
+    if (share > 1.02 || spread.low < l.min - 0.02 * travel || spread.high > l.max + 0.02 * travel)
+      warn(fmt::format("{} runs {:.4g} .. {:.4g} {}, outside the declared travel {:.4g} .. {:.4g}",
+                       name(s), spread.low, spread.high, unit, l.min, l.max));
+    double fastest = 0;
+    for (const double v : speed_of(s))
+      if (std::isfinite(v)) fastest = std::max(fastest, std::abs(v));
+    const double speed = fastest / l.velocity;
+    if (speed > 5)
+      refuse(
+          fmt::format("{} moves at {:.4g} {}/s, the declared limit is {:.4g}{}; check the units "
+                      "of position and time",
+                      name(s), fastest, unit, l.velocity, likely(speed, s.axis)));
+    if (speed > 1.1)
+      warn(fmt::format("{} moves at {:.4g} {}/s, above the declared limit of {:.4g}", name(s),
+                       fastest, unit, l.velocity));
+    if (share > 0 && share < 1e-3 && speed < 1e-3)
+      warn(
+          fmt::format("{} spans {:.4g} {} only, {:.2g} of the declared travel; check the unit "
+                      "(1000: m and mm{})",
+                      name(s), spread.span(), unit, share,
+                      is_rotary(s.axis) ? "; 57.3: radians and degrees" : ""));
+  }
+
+  /// The mistake that would make a plausible share of one this much too large.
+  static std::string likely(double share, std::size_t axis) {
+    if (is_rotary(axis) && share / (1 / kDegree) <= 1.02)
+      return "; a factor of 57.3 would fit: radians and degrees";
+    if (share / 1e3 <= 1.02) return "; a factor of 1000 would fit: m and mm";
+    if (share / 1e6 <= 1.02) return "; a factor of 1e6 would fit: m and um";
+    return "";
+  }
+
+  struct ForceFit {
+    double mass = 0, viscous = 0, dry = 0;
+    double explained = 0;      ///< share of the variance
+    double mass_explains = 0;  ///< ... that is lost without the mass
+  };
+
+  std::optional<ForceFit> fit_force(const MeasuredSignal& force, const MeasuredSignal& position) {
+    const Series v = speed_of(position);
+    const Series a = smoothed(derivative(v, record_.period), half_);
+    const Series f = smoothed(smoothed(force.value, half_), half_);
+    double fastest = 0;
+    for (const double x : v)
+      if (std::isfinite(x)) fastest = std::max(fastest, std::abs(x));
+    Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+    Eigen::Vector4d right = Eigen::Vector4d::Zero();
+    double square = 0, sum = 0, n = 0;
+    for (std::size_t k = 0; k < f.size(); ++k) {
+      if (!std::isfinite(a[k]) || !std::isfinite(f[k]) || !std::isfinite(v[k]) ||
+          std::abs(v[k]) < 0.02 * fastest)
+        continue;
+      const Eigen::Vector4d row(a[k], v[k], v[k] > 0 ? 1 : -1, 1);
+      normal += row * row.transpose();
+      right += row * f[k];
+      square += f[k] * f[k];
+      sum += f[k];
+      ++n;
+    }
+    const double variance = square - sum * sum / std::max(n, 1.0);
+    if (n < 50 || !(variance > 1e-12 * square)) return std::nullopt;
+    const Eigen::Vector4d x = normal.ldlt().solve(right);
+    if (!x.allFinite()) return std::nullopt;
+    const Eigen::Vector3d without = normal.bottomRightCorner<3, 3>().ldlt().solve(right.tail<3>());
+    const double left = square - x.dot(right), left_without = square - without.dot(right.tail<3>());
+    return ForceFit{x[0], x[1], x[2], 1 - left / variance, (left_without - left) / variance};
+  }
+
+  void check_force(const MeasuredSignal& s) {
+    const MeasuredSignal* own = motion(s.axis);
+    if (!own || constant(own->value) || constant(s.value)) return;
+    const auto fit = fit_force(s, *own);
+    if (!fit) return;
+    if (fit->explained < 0.3) {
+      for (std::size_t other = 0; other < kAxisCount; ++other) {
+        const MeasuredSignal* o = motion(other);
+        if (!o || other == s.axis || constant(o->value)) continue;
+        if (const auto fits = fit_force(s, *o); fits && fits->explained > 0.8)
+          refuse(
+              fmt::format("{} belongs to the motion of {} ({:.0f} % of it), not to that of {} "
+                          "({:.0f} %): the columns are swapped",
+                          name(s), name(*o), fits->explained * 100, name(*own),
+                          std::max(0.0, fit->explained) * 100));
+      }
+      warn(
+          fmt::format("{} has little to do with the motion of {}: mass and friction explain "
+                      "{:.0f} % of it",
+                      name(s), name(*own), std::max(0.0, fit->explained) * 100));
+      return;
+    }
+    if (fit->mass < 0 && fit->mass_explains > 0.1)
+      refuse(fmt::format("{} acts against the acceleration of {}; its sign must be -1", name(s),
+                         name(*own)));
+    if (fit->dry < 0 && fit->viscous < 0 && fit->mass_explains < 0.1)
+      warn(fmt::format("{} helps the motion of {} instead of braking it; check its sign", name(s),
+                       name(*own)));
+    if (!declared_ || fit->mass_explains < 0.1) return;
+    const double ratio = fit->mass / declared_->axes[s.axis].mechanics.total_inertia();
+    if (ratio > 5 || ratio < 0.2)
+      warn(fmt::format(
+          "{} over acceleration is {:.4g} {}, {:.3g} times the declared inertia{}; "
+          "check unit and scale of the force",
+          name(s), fit->mass, is_rotary(s.axis) ? "kg m2" : "kg", ratio, mistake(ratio)));
+  }
+
+  Record& record_;
+  const std::vector<MeasuredSignal>& velocities_;
+  const Machine* declared_;
+  std::size_t half_;
+};
+
+}  // namespace
+
+double resolution_of(const std::vector<double>& value) {
+  constexpr std::size_t kMost = 20'000;
+  constexpr double kOff = 0.05, kSure = 0.99;
+  double largest = 0;
+  for (const double v : value)
+    if (std::isfinite(v)) largest = std::max(largest, std::abs(v));
+  const double noise = 16 * 2.2e-16 * largest;
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < value.size() && steps.size() < kMost; ++k) {
+    const double d = std::abs(value[k] - value[k - 1]);
+    if (std::isfinite(d) && d > noise) steps.push_back(d);
+  }
+  if (steps.size() < 10) return 0;
+  std::sort(steps.begin(), steps.end());
+  for (const int part : {1, 2, 3}) {
+    double q = steps.front() / part;
+    if (q <= noise) break;
+    // The small multiples sharpen the step before the large ones are looked at.
+    double sum = 0, count = 0;
+    std::size_t good = 0;
+    for (const double d : steps) {
+      const double multiple = std::round(d / q);
+      if (std::abs(d / q - multiple) > kOff + multiple * noise / q) continue;
+      ++good;
+      sum += d, count += multiple;
+      q = sum / count;
+    }
+    if (static_cast<double>(good) >= kSure * static_cast<double>(steps.size())) return q;
+  }
+  return 0;
+}
+
+void check_record(Record& record, const std::vector<MeasuredSignal>& velocities,
+                  const Machine* declared) {
+  Checker(record, velocities, declared).run();
+}
+
+}  // namespace vcnc

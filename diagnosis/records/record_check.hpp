@@ -1,0 +1,31 @@
+// Whether the signals of a record can be what its map says they are.
+//
+// Everything here compares a record with itself and with the declared machine; nothing is put
+// right. What cannot be (a velocity that is another column's, positions a thousand times too large
+// for the travel, a command that belongs to another axis) is refused with the factor or the columns
+// that would explain it; what is only suspicious becomes a warning of the record.
+//
+//   velocity    regression of the velocity signal on the derivative of the position: the slope must
+//               be 1 within 10 %, the correlation above 0.7
+//   command     correlation of the position's steps with those of every axis' command
+//   force       least squares F = M a + B v + C sgn(v) + D (band-limited): M against the declared
+//               mass, the share that is explained, the sign
+//   range       positions against the declared travel, speeds against the declared limit
+//   values      constant, saturated (equal extremes in a row), quantised (step of the values),
+//               missing samples
+#pragma once
+
+#include "diagnosis/records/record.hpp"
+
+namespace vcnc {
+
+/// Adds warnings and the resolutions of the signals to `record`. Throws MeasurementError where a
+/// signal cannot be what it is said to be. `velocities` [m/s or rad/s] are signals of their axes
+/// that only serve to check; `declared` may be null.
+void check_record(Record& record, const std::vector<MeasuredSignal>& velocities,
+                  const Machine* declared);
+
+/// The step that all differences are multiples of; 0: none was found.
+double resolution_of(const std::vector<double>& value);
+
+}  // namespace vcnc

@@ -1,0 +1,156 @@
+#include "diagnosis/records/record_file.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <sstream>
+
+#include "analysis/hdf5_columns.hpp"
+#include "analysis/hdf5_file.hpp"
+#include "analysis/seal.hpp"
+#include "diagnosis/records/measured_table.hpp"
+#include "diagnosis/records/signal_name.hpp"
+
+namespace vcnc {
+
+using namespace hdf5;  // NOLINT: this file is written in its terms
+
+namespace {
+
+constexpr const char* kRecordFormat = "vcnc-record";
+constexpr std::int64_t kRecordVersion = 1;
+constexpr std::int64_t kMostSignals = 1000;
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& reason) {
+  throw MeasurementError(path.string() + ": " + reason);
+}
+
+std::string set_name(std::size_t i) { return fmt::format("signal_{}", i); }
+
+bool write_signal(hid_t file, std::size_t i, const MeasuredSignal& s) {
+  const hsize_t n = s.value.size();
+  const Handle space(H5Screate_simple(1, &n, nullptr));
+  const Handle set(H5Dcreate2(file, set_name(i).c_str(), H5T_NATIVE_DOUBLE, space, H5P_DEFAULT,
+                              H5P_DEFAULT, H5P_DEFAULT));
+  return set.ok() && write(set, "kind", std::string(to_string(s.kind))) &&
+         write(set, "axis", static_cast<std::int64_t>(s.axis)) && write(set, "source", s.source) &&
+         write(set, "resolution", s.resolution) &&
+         H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, s.value.data()) >= 0;
+}
+
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+std::string stretches_text(const Record& record) {
+  std::string text;
+  for (const Stretch& s : record.stretches)
+    text += fmt::format("{} {} {} {} {}\n", s.begin, s.end, s.condition, s.repetition,
+                        one_line(s.label));
+  return text;
+}
+
+bool read_signal(hid_t file, std::size_t i, MeasuredSignal& s, std::uintmax_t file_size) {
+  const Handle set(H5Dopen2(file, set_name(i).c_str(), H5P_DEFAULT));
+  std::string kind;
+  std::int64_t axis = 0;
+  if (!set.ok() || !read(set, "kind", kind) || !read(set, "axis", axis) ||
+      !read(set, "source", s.source) || !read(set, "resolution", s.resolution))
+    return false;
+  const std::optional<SignalKind> known = signal_kind(kind);
+  const hsize_t samples = size_of(set, 1)[0];
+  if (!known || axis < 0 || axis >= static_cast<std::int64_t>(kAxisCount) ||
+      samples > file_size / sizeof(double))
+    return false;
+  s.kind = *known;
+  s.axis = static_cast<std::size_t>(axis);
+  s.value.resize(samples);
+  return H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, s.value.data()) >= 0;
+}
+
+bool read_stretches(const std::string& text, Record& record) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream fields(line);
+    Stretch& s = record.stretches.emplace_back();
+    if (!(fields >> s.begin >> s.end >> s.condition >> s.repetition) || s.begin >= s.end ||
+        s.end > record.samples())
+      return false;
+    std::getline(fields >> std::ws, s.label);
+  }
+  return true;
+}
+
+}  // namespace
+
+void write_record(const Record& record, const std::filesystem::path& path) {
+  const Quiet quiet;
+  const std::filesystem::path part = partial(path);
+  bool written = false;
+  {
+    Handle file(H5Fcreate(part.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
+    if (!file.ok()) refuse(path, "the record cannot be created");
+    std::string warnings;
+    for (const std::string& w : record.warnings) warnings += one_line(w) + "\n";
+    written = write(file, "format", std::string(kRecordFormat)) &&
+              write(file, "format_version", kRecordVersion) &&
+              write(file, "signals", static_cast<std::int64_t>(record.signals.size())) &&
+              write(file, "source", record.source) && write(file, "period_s", record.period) &&
+              write(file, "begin_s", record.begin) &&
+              write(file, "machine_toml", record.machine_toml) &&
+              write(file, "piece_toml", record.piece_toml) &&
+              write(file, "stretches", stretches_text(record)) && write(file, "warnings", warnings);
+    for (std::size_t i = 0; written && i < record.signals.size(); ++i)
+      written = write_signal(file, i, record.signals[i]);
+    written = H5Fclose(file.release()) >= 0 && written;
+  }
+  written = written && put_seal(part);
+  std::error_code error;
+  if (written) std::filesystem::rename(part, path, error);
+  if (written && !error) return;
+  std::error_code ignored;
+  std::filesystem::remove(part, ignored);
+  refuse(path, "the record cannot be written");
+}
+
+Record read_record(const std::filesystem::path& path) {
+  if (const Seal seal = seal_of(path); seal != Seal::intact)
+    refuse(path, "the record is incomplete, damaged or was changed; import it again");
+  const Quiet quiet;
+  const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
+  std::string format, stretches, warnings;
+  std::int64_t version = 0, signals = 0;
+  if (!file.ok() || !read(file, "format", format) || format != kRecordFormat)
+    refuse(path, "is no record of vcnc import");
+  if (!read(file, "format_version", version) || version != kRecordVersion)
+    refuse(path,
+           fmt::format("record format {}; this program reads format {}", version, kRecordVersion));
+  Record record;
+  bool sound = read(file, "signals", signals) && read(file, "source", record.source) &&
+               read(file, "period_s", record.period) && read(file, "begin_s", record.begin) &&
+               read(file, "machine_toml", record.machine_toml) &&
+               read(file, "piece_toml", record.piece_toml) && read(file, "stretches", stretches) &&
+               read(file, "warnings", warnings) && signals >= 0 && signals <= kMostSignals &&
+               record.period > 0;
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  for (std::int64_t i = 0; sound && i < signals; ++i) {
+    sound = read_signal(file, static_cast<std::size_t>(i), record.signals.emplace_back(), size);
+    sound = sound && record.signals.back().value.size() == record.samples();
+  }
+  if (!sound || !read_stretches(stretches, record)) refuse(path, "the record is damaged");
+  std::istringstream lines(warnings);
+  for (std::string line; std::getline(lines, line);) record.warnings.push_back(line);
+  return record;
+}
+
+bool is_record_file(const std::filesystem::path& path) {
+  if (!looks_like_hdf5(path)) return false;
+  if (seal_of(path) != Seal::intact) return false;
+  const Quiet quiet;
+  const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
+  std::string format;
+  return file.ok() && read(file, "format", format) && format == kRecordFormat;
+}
+
+}  // namespace vcnc

@@ -1,0 +1,46 @@
+#include "diagnosis/records/signal_name.hpp"
+
+#include <array>
+#include <utility>
+
+namespace vcnc {
+
+namespace {
+
+constexpr std::array<std::pair<SignalKind, std::string_view>, 9> kKindNames{{
+    {SignalKind::command, "command"},
+    {SignalKind::position, "position"},
+    {SignalKind::twist, "twist"},
+    {SignalKind::force, "force"},
+    {SignalKind::deflection, "deflection"},
+    {SignalKind::cosine, "cosine"},
+    {SignalKind::sine, "sine"},
+    {SignalKind::temperature, "temperature"},
+    {SignalKind::clock, "clock"},
+}};
+
+}  // namespace
+
+std::string_view to_string(SignalKind kind) {
+  for (const auto& [known, name] : kKindNames)
+    if (known == kind) return name;
+  return "";
+}
+
+std::optional<SignalKind> signal_kind(std::string_view name) {
+  for (const auto& [kind, known] : kKindNames)
+    if (known == name) return kind;
+  return std::nullopt;
+}
+
+std::string signal_name(SignalKind kind, std::size_t axis) {
+  if (kind == SignalKind::temperature || kind == SignalKind::clock)
+    return std::string(to_string(kind));
+  const bool probe =
+      kind == SignalKind::deflection || kind == SignalKind::cosine || kind == SignalKind::sine;
+  const std::string place =
+      probe ? std::string(1, static_cast<char>('x' + axis % 3)) : std::string(kAxisNames.at(axis));
+  return std::string(to_string(kind)) + " " + place;
+}
+
+}  // namespace vcnc

@@ -1,0 +1,28 @@
+// Which parts of a record are repetitions of the same motion, found in its commands alone.
+//
+// A part in which some axis moves is searched for laps: from a sample on, the commanded positions
+// of all axes come back to the same values after a time T, sample by sample, for at least one more
+// lap. What is no lap is one stretch from standstill to standstill or to the next laps. Two
+// stretches are of one condition when the commands at equal shares of both are the same and take
+// the same time.
+//
+// Laps need not be a whole number of samples: they begin at the samples next to k T.
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/records/record.hpp"
+
+namespace vcnc {
+
+inline constexpr double kStandingSpeed = 0.2e-3;  ///< [m/s]; rotary: the same in rad/s
+inline constexpr double kStandingTime = 25e-3;    ///< [s]
+
+/// Where the axis is told to move, or has been within kStandingTime: a standing axis keeps a
+/// friction force that nobody can predict. True everywhere where no command is known.
+std::vector<char> moving(const Record& record, std::size_t axis);
+
+/// In order of time, not overlapping; empty where no command is known.
+std::vector<Stretch> stretches_of(const Record& record);
+
+}  // namespace vcnc

@@ -1,0 +1,100 @@
+#include "diagnosis/records/time_base.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace vcnc {
+
+namespace {
+
+/// A grid of more than this share of holes is none.
+constexpr double kMostLost = 0.5;
+
+double median_step(const std::vector<double>& time) {
+  std::vector<double> steps(time.size() - 1);
+  for (std::size_t i = 1; i < time.size(); ++i) steps[i - 1] = time[i] - time[i - 1];
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+void refuse_unordered(const std::vector<double>& time, const MeasuredTable& table) {
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    if (!std::isfinite(time[i])) throw MeasurementError(table.place(i) + ": the time is missing");
+    if (i > 0 && !(time[i] > time[i - 1]))
+      throw MeasurementError(fmt::format("{}: time does not increase: {:.9g} s after {:.9g} s",
+                                         table.place(i), time[i], time[i - 1]));
+  }
+}
+
+}  // namespace
+
+TimeBase time_base(const std::vector<double>& time, double tolerance, const MeasuredTable& table) {
+  if (time.size() < 3)
+    throw MeasurementError(
+        fmt::format("{}: {} samples are too few for a time base", table.source, time.size()));
+  refuse_unordered(time, table);
+  TimeBase base;
+  base.begin = time.front();
+  const double median = median_step(time);
+  // Steps are counted one after another, so that a wrong guess of the period does not add up.
+  double position = 0;
+  std::vector<double> step_of(time.size(), 0);
+  for (std::size_t i = 1; i < time.size(); ++i) {
+    position += std::max(1.0, std::round((time[i] - time[i - 1]) / median));
+    step_of[i] = position;
+  }
+  const auto rows = static_cast<double>(time.size());
+  if (position + 1 > rows / (1 - kMostLost))
+    throw MeasurementError(fmt::format(
+        "{}: time fits no uniform grid: most steps are {:.6g} ms, but {:.0f} such steps "
+        "pass during {:.0f} rows; a record needs a constant sampling rate",
+        table.source, median * 1e3, position, rows - 1));
+  // Line through (step, time).
+  double mean_k = 0, mean_t = 0, kk = 0, kt = 0;
+  for (std::size_t i = 0; i < time.size(); ++i) mean_k += step_of[i], mean_t += time[i] - time[0];
+  mean_k /= rows, mean_t /= rows;
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    kk += (step_of[i] - mean_k) * (step_of[i] - mean_k);
+    kt += (step_of[i] - mean_k) * (time[i] - time[0] - mean_t);
+  }
+  base.period = kt / kk;
+  const double shift = mean_t - base.period * mean_k;
+  double square = 0;
+  std::size_t worst = 0, outside = 0;
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    const double off = std::abs(time[i] - time[0] - shift - base.period * step_of[i]);
+    square += off * off;
+    outside += off > tolerance * base.period;
+    if (off > base.worst) base.worst = off, worst = i;
+    base.index.push_back(static_cast<std::size_t>(step_of[i]));
+  }
+  base.jitter = std::sqrt(square / rows);
+  if (outside > 0)
+    throw MeasurementError(fmt::format(
+        "{}: time is not uniform: {} of {} time stamps are off the grid of {:.6g} ms by more than "
+        "{:.3g} % of it, here by {:.3g} ms; a record needs a constant sampling rate, or a larger "
+        "time.jitter_percent if only the stamps are inexact",
+        table.place(worst), outside, time.size(), base.period * 1e3, tolerance * 100,
+        base.worst * 1e3));
+  base.begin += shift;
+  base.samples = base.index.back() + 1;
+  for (std::size_t i = 1; i < base.index.size(); ++i) {
+    const std::size_t hole = base.index[i] - base.index[i - 1] - 1;
+    base.gaps += hole > 0;
+    base.lost += hole;
+  }
+  return base;
+}
+
+TimeBase uniform_time_base(std::size_t rows, double period) {
+  TimeBase base;
+  base.period = period;
+  base.samples = rows;
+  for (std::size_t i = 0; i < rows; ++i) base.index.push_back(i);
+  return base;
+}
+
+}  // namespace vcnc

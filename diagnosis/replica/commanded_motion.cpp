@@ -1,0 +1,97 @@
+#include "diagnosis/replica/commanded_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vcnc {
+namespace {
+
+constexpr double kSettling = 50e-3;      // [s] after a gap, until the drive has forgotten it
+constexpr double kStarting = 0.3;        // [s] after a begin in motion, the same
+constexpr double kStandingStart = 1e-4;  // [m/s or rad/s] below which a record begins at rest
+
+/// Fills what is missing by straight lines, constant beyond the ends; tells where.
+std::vector<double> bridged(const std::vector<double>& value, std::vector<char>& known,
+                            std::size_t settling) {
+  std::vector<double> result = value;
+  const std::size_t n = value.size();
+  std::size_t i = 0;
+  while (i < n) {
+    if (!std::isnan(value[i])) {
+      ++i;
+      continue;
+    }
+    std::size_t end = i;
+    while (end < n && std::isnan(value[end])) ++end;
+    const double before = i > 0 ? value[i - 1] : end < n ? value[end] : 0;
+    const double after = end < n ? value[end] : before;
+    const double steps = static_cast<double>(end - i + 1);
+    for (std::size_t j = i; j < end; ++j)
+      result[j] = before + (after - before) * static_cast<double>(j - i + 1) / steps;
+    for (std::size_t j = i; j < std::min(n, end + settling); ++j) known[j] = false;
+    i = end;
+  }
+  return result;
+}
+
+void round_to(std::vector<double>& value, double step) {
+  if (step > 0)
+    for (double& v : value) v = std::round(v / step) * step;
+}
+
+}  // namespace
+
+std::vector<double> spline_derivative(const std::vector<double>& y, double h) {
+  const std::size_t n = y.size();
+  std::vector<double> slope(n, 0);
+  if (n < 2) return slope;
+  // Slopes d of the natural spline: 2 d0 + d1 = 3 (y1 - y0) / h;
+  // d[i-1] + 4 d[i] + d[i+1] = 3 (y[i+1] - y[i-1]) / h; the end as the beginning.
+  std::vector<double> share(n, 0);
+  share[0] = 0.5;
+  slope[0] = 1.5 * (y[1] - y[0]) / h;
+  for (std::size_t i = 1; i + 1 < n; ++i) {
+    const double pivot = 4 - share[i - 1];
+    share[i] = 1 / pivot;
+    slope[i] = (3 * (y[i + 1] - y[i - 1]) / h - slope[i - 1]) / pivot;
+  }
+  slope[n - 1] = (3 * (y[n - 1] - y[n - 2]) / h - slope[n - 2]) / (2 - share[n - 2]);
+  for (std::size_t i = n - 1; i-- > 0;) slope[i] -= share[i] * slope[i + 1];
+  return slope;
+}
+
+CommandedMotion commanded_motion(const Record& record) {
+  CommandedMotion motion;
+  motion.known.assign(record.samples(), true);
+  const auto settling = static_cast<std::size_t>(std::ceil(kSettling / record.period));
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const MeasuredSignal* signal = record.find(SignalKind::command, axis);
+    motion.told[axis] = CommandedMotion::Told::command;
+    if (signal == nullptr) {
+      signal = record.find(SignalKind::position, axis);
+      motion.told[axis] = CommandedMotion::Told::position;
+    }
+    if (signal == nullptr) {
+      motion.told[axis] = CommandedMotion::Told::nothing;
+      continue;
+    }
+    motion.position[axis] = bridged(signal->value, motion.known, settling);
+    motion.velocity[axis] = spline_derivative(motion.position[axis], record.period);
+    if (motion.told[axis] != CommandedMotion::Told::command) continue;
+    if (std::abs(motion.velocity[axis].front()) > kStandingStart) {
+      const auto starting = static_cast<std::size_t>(std::ceil(kStarting / record.period));
+      std::fill_n(motion.known.begin(), std::min(starting, motion.known.size()), false);
+    }
+    round_to(motion.position[axis], signal->resolution);
+  }
+  return motion;
+}
+
+AxisVector CommandedMotion::start(const AxisVector& declared) const {
+  AxisVector q = declared;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (!position[axis].empty()) q[axis] = position[axis].front();
+  return q;
+}
+
+}  // namespace vcnc

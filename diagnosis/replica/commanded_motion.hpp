@@ -1,0 +1,36 @@
+// The motion that a record's machine was told to make: position and velocity of every axis at every
+// sample, as the drives need them.
+//
+// A sample that is missing is bridged by a straight line (and said so), because a drive was told
+// something. Velocity: derivative of the cubic spline (natural ends) through the positions; its
+// error is h^2/24 of a jump of the jerk between two samples and of order h^4 elsewhere. Source:
+// de Boor, A Practical Guide to Splines, 1978, ch. IV.
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/records/record.hpp"
+#include "model/axes.hpp"
+
+namespace vcnc {
+
+struct CommandedMotion {
+  /// What is known of one axis.
+  enum class Told {
+    nothing,   ///< it stands where the declared machine starts
+    position,  ///< no command, but where it was measured: it is taken to be there
+    command
+  };
+  PerAxis<Told> told{};
+  PerAxis<std::vector<double>> position, velocity;  ///< one per sample; empty where nothing is told
+  std::vector<char> known;  ///< false: bridged, soon after, or a begin in motion
+
+  AxisVector start(const AxisVector& declared) const;
+};
+
+CommandedMotion commanded_motion(const Record& record);
+
+/// Derivative of the natural cubic spline through equidistant values.
+std::vector<double> spline_derivative(const std::vector<double>& value, double period);
+
+}  // namespace vcnc

@@ -1,0 +1,258 @@
+#include "diagnosis/replica/machine_replica.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <list>
+#include <stdexcept>
+
+#include "diagnosis/replica/effect_stage.hpp"
+#include "diagnosis/search/candidate.hpp"
+
+namespace vcnc {
+
+namespace {
+
+constexpr double kCycleTime = 1e-3;  // [s]
+constexpr std::size_t kAxisReplays = 6, kBalls = 8;
+
+/// The commands at 1 ms.
+CommandedMotion at_cycles(const CommandedMotion& motion, double period) {
+  if (std::abs(period - kCycleTime) < 1e-9) return motion;
+  CommandedMotion result;
+  result.told = motion.told;
+  const std::size_t samples = motion.known.size();
+  const double duration = static_cast<double>(samples - 1) * period;
+  const auto cycles = static_cast<std::size_t>(std::floor(duration / kCycleTime + 1e-9)) + 1;
+  result.known.assign(cycles, true);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const std::vector<double>&x = motion.position[axis], &v = motion.velocity[axis];
+    if (x.empty()) continue;
+    for (std::size_t k = 0; k < cycles; ++k) {
+      const double at = static_cast<double>(k) * kCycleTime / period;
+      const auto i = std::min(static_cast<std::size_t>(at), samples - 2);
+      const double s = at - static_cast<double>(i);
+      const double b = v[i] * period, b_end = v[i + 1] * period, way = x[i + 1] - x[i];
+      const double c = 3 * way - 2 * b - b_end, d = b + b_end - 2 * way;
+      result.position[axis].push_back(x[i] + s * (b + s * (c + s * d)));
+      result.velocity[axis].push_back((b + s * (2 * c + s * 3 * d)) / period);
+    }
+  }
+  return result;
+}
+
+std::vector<ComparedChannel> channels_of(const Record& record, const CommandedMotion& motion) {
+  std::vector<ComparedChannel> channels;
+  for (const MeasuredSignal& signal : record.signals) {
+    if (!is_compared(signal.kind)) continue;
+    if (signal.kind == SignalKind::deflection ||
+        motion.told[signal.axis] == CommandedMotion::Told::command)
+      channels.push_back({signal.kind, signal.axis});
+  }
+  return channels;
+}
+
+/// a + factor b
+Deflections sum(const Deflections& a, const Deflections& b, double factor) {
+  Deflections result = a;
+  for (std::size_t c = 0; c < a.size(); ++c)
+    for (std::size_t k = 0; k < a[c].size(); ++k) result[c][k] += factor * b[c][k];
+  return result;
+}
+
+}  // namespace
+
+template <class T>
+class MachineReplica::Memory {
+ public:
+  explicit Memory(std::size_t capacity) : capacity_(capacity) {}
+
+  void clear() { kept_.clear(); }
+
+  /// What is kept under `print`, or what `make` makes of it now.
+  template <class Make>
+  std::shared_ptr<const T> find_or_make(const std::string& print, Make&& make) {
+    if (auto kept = find(print)) return kept;
+    auto made = std::make_shared<const T>(make());  // two threads may make the same
+    const std::lock_guard lock(mutex_);
+    kept_.emplace_front(print, made);
+    if (kept_.size() > capacity_) kept_.pop_back();
+    return made;
+  }
+
+ private:
+  std::shared_ptr<const T> find(const std::string& print) {
+    const std::lock_guard lock(mutex_);
+    const auto found = std::find_if(kept_.begin(), kept_.end(),
+                                    [&](const auto& entry) { return entry.first == print; });
+    if (found == kept_.end()) return nullptr;
+    kept_.splice(kept_.begin(), kept_, found);
+    return kept_.front().second;
+  }
+
+  std::size_t capacity_;
+  std::mutex mutex_;
+  std::list<std::pair<std::string, std::shared_ptr<const T>>> kept_;  ///< last used first
+};
+
+/// A machine as the replica takes it.
+struct MachineReplica::Hypothesis {
+  Machine machine;            ///< without chance, starting where the record does
+  Machine actual;             ///< with its deviations applied
+  PerAxis<std::string> axis;  ///< fingerprints
+  std::string contact;        ///< without the axes
+  std::string ball, sensing;
+};
+
+struct MachineReplica::Anchor {
+  Anchor(const Hypothesis& h, const AxisReplays& axes)
+      : contact(h.contact), ball(h.ball), sensing(h.sensing), poses(h.actual, axes) {}
+
+  std::string contact, ball, sensing;
+  NearbyPoses poses;
+  bool needs_full = false;
+  ProbeReplay full;
+  Deflections ball_offset;     ///< full less quick
+  Deflections reading_offset;  ///< the same, both of the full ball
+};
+
+MachineReplica::MachineReplica(const Record& record, const Machine& declared,
+                               const std::optional<PieceParams>& piece)
+    : declared_(declared), period_(record.period), samples_(record.samples()) {
+  if (samples_ < 2) throw std::invalid_argument(record.source + ": holds no motion");
+  const CommandedMotion motion = commanded_motion(record);
+  channels_ = channels_of(record, motion);
+  probes_ = std::any_of(channels_.begin(), channels_.end(),
+                        [](const ComparedChannel& c) { return c.kind == SignalKind::deflection; });
+  known_ = motion.known;
+  motion_ = at_cycles(motion, period_);
+  if (piece) piece_ = make_piece(*piece);
+  for (auto& memory : axis_memory_) memory = std::make_unique<Memory<AxisReplay>>(kAxisReplays);
+  ball_memory_ = std::make_unique<Memory<Deflections>>(kBalls);
+  anchor(declared);
+}
+
+MachineReplica::~MachineReplica() = default;
+
+MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine) const {
+  Hypothesis h;
+  h.machine = as_hypothesis(declared_, machine);
+  for_each_effect_of(h.machine.effects, []<class Effect>(Effect& effect, std::size_t) {
+    if (is_chance<Effect>()) effect = Effect();
+  });
+  h.actual = vcnc::actual(h.machine);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (!motion_.position[axis].empty())
+      h.machine.axes[axis].limits.start = h.actual.axes[axis].limits.start =
+          motion_.position[axis].front();
+  h.ball = h.contact = fingerprint_of_contact(h.actual);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    h.axis[axis] = fingerprint_of_axis(h.machine, h.actual, axis);
+    h.ball += h.axis[axis];
+  }
+  h.sensing = fingerprint_of_sensing(h.actual);
+  return h;
+}
+
+AxisReplays MachineReplica::axes_of(const Hypothesis& h) const {
+  AxisReplays replays;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    replays[axis] =
+        axis_memory_[axis]->find_or_make(h.axis[axis], [&] { return replayed(h, axis); });
+  return replays;
+}
+
+/// With its signals at the record's samples.
+AxisReplay MachineReplica::replayed(const Hypothesis& h, std::size_t axis) const {
+  AxisReplay replay = replay_axis(h.machine, h.actual, axis, motion_);
+  for (SharedSeries* s : {&replay.measured, &replay.twist, &replay.force}) *s = as_recorded(*s);
+  return replay;
+}
+
+/// Quickly.
+std::shared_ptr<const Deflections> MachineReplica::ball_of(const Hypothesis& h,
+                                                           const AxisReplays& axes) const {
+  return ball_memory_->find_or_make(h.ball, [&] {
+    const bool same = h.contact == anchor_->contact;
+    return replay_contact(h.actual, piece_.get(),
+                          same ? anchor_->poses.at(axes) : replay_poses(h.actual, axes));
+  });
+}
+
+void MachineReplica::anchor(const Machine& machine) {
+  if (!probes_) return;
+  const Hypothesis h = hypothesis_of(machine);
+  const AxisReplays axes = axes_of(h);
+  auto anchor = std::make_unique<Anchor>(h, axes);
+  anchor->needs_full = needs_full_probe(h.actual);
+  anchor->full = replay_probe(h.actual, piece_.get(), axes);
+  const Deflections quick = replay_contact(h.actual, piece_.get(), anchor->poses.poses());
+  anchor->ball_offset = sum(anchor->full.ball, quick, -1);
+  anchor->reading_offset =
+      sum(anchor->full.reading, replay_sensing(h.actual, anchor->full.ball, axes), -1);
+  anchor_ = std::move(anchor);
+  ball_memory_->clear();  // it holds what was seen from another anchor
+}
+
+Deflections MachineReplica::reading_of(const Hypothesis& h, const AxisReplays& axes) const {
+  if (h.ball == anchor_->ball && h.sensing == anchor_->sensing) return anchor_->full.reading;
+  if (anchor_->needs_full || needs_full_probe(h.actual))
+    return replay_probe(h.actual, piece_.get(), axes).reading;
+  const Deflections ball = sum(*ball_of(h, axes), anchor_->ball_offset, 1);
+  return sum(replay_sensing(h.actual, ball, axes), anchor_->reading_offset, 1);
+}
+
+/// Values at the record's samples of what is known at every cycle.
+std::vector<double> MachineReplica::as_recorded(const std::vector<double>& per_cycle) const {
+  std::vector<double> result(samples_, kMissing);
+  const bool same = std::abs(period_ - kCycleTime) < 1e-9;
+  for (std::size_t i = 0; i < samples_; ++i) {
+    if (!known_[i]) continue;
+    if (same) {
+      result[i] = per_cycle[i];
+      continue;
+    }
+    const double at = static_cast<double>(i) * period_ / kCycleTime;
+    const auto k = static_cast<std::size_t>(at);
+    if (k + 1 < per_cycle.size())
+      result[i] = per_cycle[k] + (per_cycle[k + 1] - per_cycle[k]) * (at - static_cast<double>(k));
+  }
+  return result;
+}
+
+Prediction MachineReplica::assembled(const AxisReplays& axes, const Deflections& reading) const {
+  Prediction all;
+  for (const ComparedChannel& channel : channels_) {
+    switch (channel.kind) {
+      case SignalKind::position:
+        all.push_back(axes[channel.axis]->measured);
+        break;
+      case SignalKind::twist:
+        all.push_back(axes[channel.axis]->twist);
+        break;
+      case SignalKind::force:
+        all.push_back(axes[channel.axis]->force);
+        break;
+      default:
+        all.push_back(as_recorded(reading[channel.axis]));
+        break;
+    }
+  }
+  return all;
+}
+
+Prediction MachineReplica::predict(const Machine& machine) const {
+  const Hypothesis h = hypothesis_of(machine);
+  const AxisReplays axes = axes_of(h);
+  return assembled(axes, probes_ ? reading_of(h, axes) : Deflections{});
+}
+
+Prediction MachineReplica::predict_in_full(const Machine& machine) const {
+  const Hypothesis h = hypothesis_of(machine);
+  AxisReplays axes;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    axes[axis] = std::make_shared<AxisReplay>(replayed(h, axis));
+  return assembled(axes,
+                   probes_ ? replay_probe(h.actual, piece_.get(), axes).reading : Deflections{});
+}
+
+}  // namespace vcnc

@@ -1,0 +1,83 @@
+// The replica of a whole machine: every axis by its drive, the probe by its sensor, on the commands
+// of a record.
+//
+// A hypothesis may say what is otherwise than declared in both ways: as a deviation, or by another
+// number outside [effects], which then is what the bodies are like and not what the controllers
+// know (as_hypothesis).
+//
+// An axis that the record has no command of is taken to be where it was measured, or to stand where
+// the declared machine starts. Records at another rate than the bus cycle are brought to 1 ms by
+// the spline of the commands and back by straight lines.
+//
+// What has been computed is kept and found again by what it depends on: changing something of X
+// does not simulate Y, changing the probe simulates no axis. The results are the same as without.
+//
+// Axes are always simulated in full. The probe is, for one machine, the anchor: the declared one
+// until another is chosen. Of any other machine only the difference from the anchor is computed, in
+// steps of 1 ms (probe_replay.hpp): first of the true deflection, then of what is read of it,
+// value = full(anchor) + quick(machine) - quick(anchor). So it is exact at the anchor, and the
+// nearer the better. What cannot be had quickly is computed in full.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diagnosis/records/record.hpp"
+#include "diagnosis/replica/axis_replay.hpp"
+#include "diagnosis/replica/commanded_motion.hpp"
+#include "diagnosis/replica/probe_replay.hpp"
+#include "diagnosis/replica/replica.hpp"
+#include "model/geometry/piece.hpp"
+
+namespace vcnc {
+
+class MachineReplica : public Replica {
+ public:
+  /// Predicts the channels that `record` has and that its commands say something of. Throws
+  /// std::invalid_argument where the piece cannot be built.
+  MachineReplica(const Record& record, const Machine& declared,
+                 const std::optional<PieceParams>& piece);
+  ~MachineReplica() override;
+
+  const std::vector<ComparedChannel>& channels() const override { return channels_; }
+  Prediction predict(const Machine& hypothesis) const override;
+  /// The same with the probe in full, too, and without the memory of earlier predictions.
+  Prediction predict_in_full(const Machine& hypothesis) const;
+
+  /// What follows is asked about machines near this one. Not while others predict.
+  void anchor(const Machine& machine) override;
+
+ private:
+  /// Results by fingerprint, the least recently used ones forgotten.
+  template <class T>
+  class Memory;
+
+  struct Hypothesis;
+  struct Anchor;
+  Hypothesis hypothesis_of(const Machine& machine) const;
+  AxisReplays axes_of(const Hypothesis& hypothesis) const;
+  std::shared_ptr<const Deflections> ball_of(const Hypothesis& hypothesis,
+                                             const AxisReplays& axes) const;
+  Deflections reading_of(const Hypothesis& hypothesis, const AxisReplays& axes) const;
+  AxisReplay replayed(const Hypothesis& hypothesis, std::size_t axis) const;
+  Prediction assembled(const AxisReplays& axes, const Deflections& reading) const;
+  std::vector<double> as_recorded(const std::vector<double>& per_cycle) const;
+
+  Machine declared_;
+  double period_;
+  std::size_t samples_;
+  std::vector<ComparedChannel> channels_;
+  bool probes_ = false;      ///< some channel is a deflection
+  CommandedMotion motion_;   ///< at 1 ms
+  std::vector<char> known_;  ///< at the record's rate
+  std::unique_ptr<Piece> piece_;
+  PerAxis<std::unique_ptr<Memory<AxisReplay>>> axis_memory_;
+  std::unique_ptr<Memory<Deflections>> ball_memory_;
+  std::unique_ptr<const Anchor> anchor_;  ///< null where nothing is probed
+};
+
+}  // namespace vcnc

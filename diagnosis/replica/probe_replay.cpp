@@ -1,0 +1,297 @@
+#include "diagnosis/replica/probe_replay.hpp"
+
+#include <cmath>
+
+#include "diagnosis/replica/effect_stage.hpp"
+#include "diagnosis/replica/fingerprint.hpp"
+#include "model/probe/probe_sensor.hpp"
+
+namespace vcnc {
+namespace {
+
+constexpr std::uint64_t kSeed = 1;        // of noise that a replica does not have
+constexpr double kStep = 1e-3;            // [s]
+constexpr double kRadiusChange = 1e-3;    // [m] effects change the radius by less than this
+constexpr double kSignalAmplitude = 0.5;  // [V]
+
+Moment moment_of(std::size_t cycle) {
+  return {static_cast<double>(cycle) * kStep, kStep, static_cast<std::int64_t>(cycle)};
+}
+
+/// True motion of the axes at the end of a cycle, as the probe module finds it from its samples.
+void read_motions(const AxisReplays& axes, std::size_t cycle, Motions<double>& motions) {
+  const std::size_t s = (cycle + 1) * kTruthPerCycle - 1;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const double* const x = &axes[i]->truth[s];
+    if (cycle == 0) {
+      motions[i] = {x[0], 0, 0};
+      continue;
+    }
+    const double v = (x[0] - x[-1]) / kProbeSampleTime, u = (x[-1] - x[-2]) / kProbeSampleTime;
+    motions[i] = {x[0], v, (v - u) / kProbeSampleTime};
+  }
+}
+
+/// Of one axis at the end of a cycle.
+double position_at(const AxisReplays& axes, std::size_t axis, std::size_t cycle) {
+  return axes[axis]->truth[(cycle + 1) * kTruthPerCycle - 1];
+}
+
+AxisVector positions(const Motions<double>& motions) {
+  AxisVector q;
+  for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = motions[i].position;
+  return q;
+}
+
+/// The ball in steps of a cycle.
+class CoarseContact {
+ public:
+  CoarseContact(const Machine& actual, const Piece* piece)
+      : probe_(actual.probe),
+        effects_(machine_chain<TouchPort>(actual.effects, kSeed)),
+        ball_{.radius = probe_.ball_radius},
+        piece_(piece),
+        mass_(probe_.moving_mass + probe_.stylus_mass) {
+    const double w = std::sqrt(probe_.spring_rate / mass_), b = probe_.damping_ratio * w;
+    const double square = w * w - b * b;  // of the damped frequency; negative: aperiodic
+    const double w_d = std::sqrt(std::abs(square));
+    const double fade = std::exp(-b * kStep);
+    const double c = square > 0 ? std::cos(w_d * kStep) : std::cosh(w_d * kStep);
+    double s = kStep;
+    if (w_d > 0) s = (square > 0 ? std::sin(w_d * kStep) : std::sinh(w_d * kStep)) / w_d;
+    rr_ = fade * (c + b * s);
+    rv_ = fade * s;
+    vr_ = -fade * w * w * s;
+    vv_ = fade * (c - b * s);
+  }
+
+  Vec3 step(const ToolPose& pose, std::size_t cycle) {
+    if (!effects_.empty()) feel(pose, cycle);
+    if (!placed_) place(pose);
+    const Vec3 v_tool = (pose.p_WT - p_tool_) / kStep;
+    const Vec3 r = p_ - p_tool_, w = v_ - v_tool;
+    Vec3 p = pose.p_WT + rr_ * r + rv_ * w, v = v_tool + vr_ * r + vv_ * w;
+    if (piece_ != nullptr) touch(p, v);
+    p_ = p;
+    v_ = v;
+    p_tool_ = pose.p_WT;
+    return pose.R_WT.transpose() * (p_ - pose.p_WT);
+  }
+
+ private:
+  void place(const ToolPose& pose) {
+    p_ = p_tool_ = pose.p_WT;
+    placed_ = true;
+    if (piece_ == nullptr) return;
+    surface_ = piece_->nearest(p_, surface_);
+    if (surface_.valid && surface_.distance < ball_.radius)
+      p_ += (ball_.radius - surface_.distance) * surface_.n;
+  }
+
+  /// What the ball and its contact are like at this step, as in ProbeContact.
+  void feel(const ToolPose& pose, std::size_t cycle) {
+    ball_ = {.radius = probe_.ball_radius};
+    TouchPort::Context<double> context{.moment = moment_of(cycle)};
+    if (surface_.valid) {
+      context.normal_W = surface_.n;
+      context.normal_T = pose.R_WT.transpose() * surface_.n;
+    }
+    effects_.step(ball_, context);
+  }
+
+  void touch(Vec3& p, Vec3& v) {
+    if ((p - searched_).norm() < clearance_) return;
+    surface_ = piece_->nearest(p, surface_);
+    const double gap = surface_.distance - ball_.radius;
+    searched_ = p;
+    clearance_ = surface_.valid ? gap - (effects_.empty() ? 0 : kRadiusChange) : 0;
+    if (!surface_.valid || gap >= 0) return;
+    const Vec3& n = surface_.n;
+    p -= gap * n;
+    const double push = n.dot(p - p_) / kStep - n.dot(v);
+    v += push * n;
+    if (ball_.friction > 0 && push > 0) {
+      const Vec3 sliding = v - n * n.dot(v);
+      const double speed = sliding.norm();
+      if (!(speed > 0)) return;
+      const Vec3 change = sliding * -std::min(1.0, ball_.friction * push / speed);
+      v += change;
+      p += 0.5 * kStep * change;
+    }
+  }
+
+  ProbeParams probe_;
+  Chain<TouchPort> effects_;
+  TouchPort::Signal<double> ball_;
+  const Piece* piece_;
+  double mass_;
+  double rr_, rv_, vr_, vv_;  ///< free motion over a step
+  bool placed_ = false;
+  Vec3 p_ = Vec3::Zero(), v_ = Vec3::Zero(), p_tool_ = Vec3::Zero();
+  SurfacePoint surface_;
+  Vec3 searched_ = Vec3::Zero();
+  double clearance_ = 0;
+};
+
+/// Adds the effects of one stage.
+void add_effects(Fingerprint& print, const Machine& actual, EffectStage stage) {
+  for_each_effect_of(actual.effects, [&]<class Effect>(const Effect& effect, std::size_t axis) {
+    if (stage_of<typename Effect::Port>() != stage || effect.null()) return;
+    for (const char c : Effect::text.name) print.add(c);
+    print.add(axis);
+    if constexpr (Effect::place == Place::axis)
+      Effect::fields(effect, print, is_rotary(axis));
+    else
+      Effect::fields(effect, print);
+  });
+}
+
+}  // namespace
+
+ProbeReplay replay_probe(const Machine& actual, const Piece* piece, const AxisReplays& axes) {
+  const std::size_t samples = axes[0]->truth.size(), cycles = samples / kTruthPerCycle;
+  ProbeReplay replay;
+  for (std::size_t c = 0; c < 3; ++c) {
+    replay.ball[c].resize(cycles);
+    replay.reading[c].resize(cycles);
+  }
+  ProbeSensor sensor(actual, piece, kSeed);
+  for (std::size_t s = kTruthPerCycle - 1; s < samples; ++s) {  // the first is that of instant 0
+    AxisVector q;
+    for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = axes[i]->truth[s];
+    sensor.sample(q);
+    if (s % kTruthPerCycle != kTruthPerCycle - 1) continue;
+    for (std::size_t c = 0; c < 3; ++c) {
+      replay.ball[c][s / kTruthPerCycle] = sensor.deflection()[static_cast<Eigen::Index>(c)];
+      replay.reading[c][s / kTruthPerCycle] = sensor.channels()[c].deflection;
+    }
+  }
+  return replay;
+}
+
+Poses replay_poses(const Machine& actual, const AxisReplays& axes) {
+  const std::size_t cycles = axes[0]->truth.size() / kTruthPerCycle;
+  Poses poses(cycles);
+  const Kinematics kinematics(actual.kinematics, actual.probe.length, actual.setup.work_offset[0]);
+  Chain<PosePort> errors = machine_chain<PosePort>(actual.effects, kSeed);
+  PosePort::Context<double> context;
+  for (std::size_t k = 0; k < cycles; ++k) {
+    read_motions(axes, k, context.axes);
+    const AxisVector q = positions(context.axes);
+    if (errors.empty()) {
+      poses[k] = kinematics.forward(q);
+      continue;
+    }
+    context.moment = moment_of(k);
+    context.arm = kinematics.arms(q);
+    GeometryErrors<double> error;
+    errors.step(error, context);
+    poses[k] = kinematics.forward(q, error);
+  }
+  return poses;
+}
+
+NearbyPoses::NearbyPoses(const Machine& actual, const AxisReplays& axes)
+    : axes_(axes), poses_(replay_poses(actual, axes)), changes_(poses_.size()) {
+  const Kinematics kinematics(actual.kinematics, actual.probe.length, actual.setup.work_offset[0]);
+  const double a_sign = actual.kinematics.a_reversed ? -1 : 1,
+               c_sign = actual.kinematics.c_reversed ? -1 : 1;
+  for (std::size_t k = 0; k < poses_.size(); ++k) {
+    AxisVector q;
+    for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = position_at(axes, i, k);
+    // Whatever turns the pose against the ideal one turns its changes, too.
+    const Mat3 turned = poses_[k].R_WT * kinematics.forward(q).R_WT.transpose();
+    const double c = c_sign * q[kC];
+    changes_[k] = {turned * kinematics.jacobian(q),
+                   turned * (a_sign * Vec3(std::cos(c), std::sin(c), 0)),
+                   turned * (c_sign * Vec3::UnitZ())};
+  }
+}
+
+Poses NearbyPoses::at(const AxisReplays& axes) const {
+  Poses moved = poses_;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    if (axes[i] == axes_[i]) continue;
+    for (std::size_t k = 0; k < moved.size(); ++k) {
+      const double dq = position_at(axes, i, k) - position_at(axes_, i, k);
+      moved[k].p_WT += changes_[k].J.col(static_cast<Eigen::Index>(i)) * dq;
+      if (!is_rotary(i)) continue;
+      const Vec3 turn = (i == kA ? changes_[k].w_A : changes_[k].w_C) * dq;
+      for (Eigen::Index c = 0; c < 3; ++c)
+        moved[k].R_WT.col(c) += turn.cross(poses_[k].R_WT.col(c));
+    }
+  }
+  return moved;
+}
+
+Deflections replay_contact(const Machine& actual, const Piece* piece, const Poses& poses) {
+  Deflections ball;
+  for (std::vector<double>& b : ball) b.resize(poses.size());
+  CoarseContact contact(actual, piece);
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const Vec3 deflection = contact.step(poses[k], k);
+    for (std::size_t c = 0; c < 3; ++c) ball[c][k] = deflection[static_cast<Eigen::Index>(c)];
+  }
+  return ball;
+}
+
+Deflections replay_sensing(const Machine& actual, const Deflections& ball,
+                           const AxisReplays& axes) {
+  Chain<DeflectionPort> feeling = machine_chain<DeflectionPort>(actual.effects, kSeed);
+  Chain<AnaloguePort> signals = machine_chain<AnaloguePort>(actual.effects, kSeed);
+  Chain<ReadingPort> counting = machine_chain<ReadingPort>(actual.effects, kSeed);
+  if (feeling.empty() && signals.empty() && counting.empty()) return ball;
+  const double period = actual.probe.signal_period;
+  Deflections reading = ball;
+  for (std::size_t k = 0; k < ball[0].size(); ++k) {
+    Vec3 x(ball[0][k], ball[1][k], ball[2][k]);
+    if (!feeling.empty()) {
+      DeflectionPort::Signal<double> signal{x};
+      feeling.step(signal, {moment_of(k), actual.probe.spring_rate});
+      x = signal.deflection;
+    }
+    for (int c = 0; c < 3 && !signals.empty(); ++c) {
+      const double phase = 2 * kPi / period * x[c];
+      AnaloguePort::Signal<double> signal{kSignalAmplitude * std::cos(phase),
+                                          kSignalAmplitude * std::sin(phase)};
+      signals.step(signal, {moment_of(k), c, kSignalAmplitude});
+      const double shift = std::atan2(signal.sine, signal.cosine) - phase;
+      x[c] += (shift - 2 * kPi * std::round(shift / (2 * kPi))) * period / (2 * kPi);
+    }
+    if (!counting.empty()) {
+      Motions<double> motions;
+      read_motions(axes, k, motions);
+      ReadingPort::Signal<double> signal{x};
+      counting.step(signal, {moment_of(k), period, &motions});
+      x = signal.deflection;
+    }
+    for (std::size_t c = 0; c < 3; ++c) reading[c][k] = x[static_cast<Eigen::Index>(c)];
+  }
+  return reading;
+}
+
+bool needs_full_probe(const Machine& actual) {
+  return !actual.effects.get<ContactLoss>().null() || !actual.effects.get<ReturnToZero>().null() ||
+         (actual.probe.correction == ProbeParams::Correction::heydemann &&
+          !machine_chain<AnaloguePort>(actual.effects, kSeed).empty());
+}
+
+std::string fingerprint_of_contact(const Machine& actual) {
+  Fingerprint print;
+  KinematicsParams::fields(actual.kinematics, print);
+  ProbeParams::fields(actual.probe, print);
+  SetupParams::fields(actual.setup, print);
+  add_effects(print, actual, EffectStage::contact);
+  return print.bytes();
+}
+
+std::string fingerprint_of_sensing(const Machine& actual) {
+  Fingerprint print;
+  ProbeParams::fields(actual.probe, print);
+  add_effects(print, actual, EffectStage::sensing);
+  for (const Law& law : actual.effects.laws)
+    if (law.point == Law::Point::reading) Law::fields(law, print);
+  return print.bytes();
+}
+
+}  // namespace vcnc

@@ -1,0 +1,87 @@
+// The probe of a hypothesis, on axes whose true motion is known: in full, or quickly.
+//
+// In full: every sample of 100 us with everything that the simulated probe does (ProbeSensor).
+//
+// Quickly, for differences between two similar machines, one step per cycle of h = 1 ms in two
+// stages. Contact: the ball on its spring moves freely along the exact solution for a tool that
+// moves evenly over the step, with r = p - p_T, w^2 = k/m, b = zeta w, w_d^2 = w^2 - b^2:
+//
+//   r(h)  = e^(-bh) [ (cos + b/w_d sin) r + sin/w_d r' ]
+//   r'(h) = e^(-bh) [ -w^2/w_d sin r + (cos - b/w_d sin) r' ]      (cos, sin of w_d h)
+//
+// then the surface puts it back along its normal as in ProbeContact; the normal force that this
+// takes, N = m dv_n / h, limits Coulomb friction, whose impulse and that of the guides act evenly
+// over the step. Sensing: effects on the deflection and the counters once per cycle; those on the
+// sin/cos signals by the phase they shift, x += (atan2(w', u') - phi) period / 2 pi, without
+// converter and without counting: nothing slips.
+//
+// Neglected against the full probe: motion of the tool within 1 ms other than even, quantisation by
+// the converter (0.13 nm), and what needs_full_probe() names. What is left cancels in the
+// difference to first order.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "diagnosis/replica/axis_replay.hpp"
+#include "model/geometry/kinematics.hpp"
+#include "model/geometry/piece.hpp"
+#include "model/machine.hpp"
+
+namespace vcnc {
+
+using AxisReplays = PerAxis<std::shared_ptr<const AxisReplay>>;
+/// x, y, z in the probe frame, one value per cycle [m].
+using Deflections = std::array<std::vector<double>, 3>;
+
+struct ProbeReplay {
+  Deflections ball;     ///< the true deflection
+  Deflections reading;  ///< what the module makes of it
+};
+
+/// In full. `actual` is a hypothesis with its deviations applied; `piece` may be null.
+ProbeReplay replay_probe(const Machine& actual, const Piece* piece, const AxisReplays& axes);
+
+/// Poses of the tool at the end of every cycle.
+using Poses = std::vector<ToolPose>;
+Poses replay_poses(const Machine& actual, const AxisReplays& axes);
+
+/// How poses change with the axes around a machine whose axes are `axes`:
+///
+///   p_WT' = p_WT + J dq,   R_WT' = (1 + [w_A dA + w_C dC]x) R_WT
+///
+/// What errors of the geometry do at another place is neglected, as are squares of dq.
+class NearbyPoses {
+ public:
+  NearbyPoses(const Machine& actual, const AxisReplays& axes);
+
+  const Poses& poses() const { return poses_; }
+  Poses at(const AxisReplays& axes) const;
+
+ private:
+  struct Change {
+    Eigen::Matrix<double, 3, 5> J;  ///< [m/m], [m/rad]
+    Vec3 w_A, w_C;                  ///< what R_WT turns about
+  };
+  AxisReplays axes_;
+  Poses poses_;
+  std::vector<Change> changes_;
+};
+
+/// Quickly: the true deflection of the ball.
+Deflections replay_contact(const Machine& actual, const Piece* piece, const Poses& poses);
+/// Quickly: what the probe says of it.
+Deflections replay_sensing(const Machine& actual, const Deflections& ball, const AxisReplays& axes);
+
+/// What only the full probe tells: the piece that is lifted, the hysteresis of the guides, whose
+/// friction depends on the sliding within a cycle, and effects on signals that are corrected
+/// online.
+bool needs_full_probe(const Machine& actual);
+
+/// What replay_contact() and replay_sensing() depend on besides the axes.
+std::string fingerprint_of_contact(const Machine& actual);
+std::string fingerprint_of_sensing(const Machine& actual);
+
+}  // namespace vcnc

@@ -1,0 +1,128 @@
+#include "diagnosis/report/diagnosis_text.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/replica/model_comparison.hpp"
+#include "model/machine.hpp"
+#include "model/parameters.hpp"
+
+namespace vcnc {
+
+namespace {
+
+std::string name_of(const FoundEffect& e) {
+  if (e.name == "deviation") return e.place;
+  return e.place.empty() ? e.name : e.place + "." + e.name;
+}
+
+/// Last part of a key, with its component.
+std::string short_key(const std::string& key, const std::string& effect) {
+  const std::size_t at = key.rfind(effect + ".");
+  if (!effect.empty() && at != std::string::npos) return key.substr(at + effect.size() + 1);
+  return key.substr(key.rfind('.') + 1);
+}
+
+}  // namespace
+
+std::string unit_of_key(const std::string& key) {
+  static const std::vector<std::pair<std::string, std::string>> units = [] {
+    Machine machine;
+    std::vector<std::pair<std::string, std::string>> all;
+    for (const Parameter& p : parameters(machine)) all.emplace_back(p.key, p.unit.suffix);
+    std::sort(all.begin(), all.end());
+    return all;
+  }();
+  const auto at = std::lower_bound(units.begin(), units.end(), std::pair(key, std::string()));
+  return at != units.end() && at->first == key ? at->second : "";
+}
+
+std::string with_interval(const FittedNumber& n) {
+  const double width = n.high - n.low;
+  const double least = std::isfinite(width) && width > 0 ? width : std::abs(n.value) * 1e-3;
+  const int digits =
+      least > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(least))), 0, 9) : 3;
+  return fmt::format("{:.{}f} [{:.{}f} .. {:.{}f}]", n.value, digits, n.low, digits, n.high,
+                     digits);
+}
+
+std::string verdict_sentence(const Diagnosis& d) {
+  switch (d.verdict) {
+    case DiagnosisVerdict::explained:
+      return "what was added leaves nothing but noise";
+    case DiagnosisVerdict::partly:
+      return fmt::format(
+          "what was added explains {:.0f} % of what was to be explained{}", d.explained_share * 100,
+          d.model_form_share > 0
+              ? fmt::format("; {:.0f} % is an error of the model's form, so no cause "
+                            "is named",
+                            d.model_form_share * 100)
+              : "");
+    case DiagnosisVerdict::unexplained:
+      return d.law ? d.law->words
+                   : std::string("something repeats itself that nothing in the library does");
+    case DiagnosisVerdict::no_deviation:
+      return "the machine does what is declared, within what this run can show";
+    case DiagnosisVerdict::not_identifiable:
+      return "the run does not excite what it should tell";
+  }
+  return "";
+}
+
+std::string figures_table(const std::vector<SignalFigure>& figures) {
+  if (figures.empty()) return "";
+  std::size_t width = 12;
+  for (const SignalFigure& f : figures) width = std::max(width, f.run.size());
+  std::string text = fmt::format("{:<14}{:<{}}  {:>11}{:>11}{:>11}\n", "rms", "", width, "before",
+                                 "after", "noise");
+  for (const SignalFigure& f : figures) {
+    const ShownUnit unit = shown_unit(f.channel);
+    const std::string floor =
+        f.floor > 0 ? fmt::format("{:.4g}", f.floor * unit.factor) : std::string("-");
+    text +=
+        fmt::format("{:<14}{:<{}}  {:>11.4g}{:>11.4g}{:>11} {}\n", channel_name(f.channel), f.run,
+                    width, f.before * unit.factor, f.after * unit.factor, floor, unit.name);
+  }
+  return text;
+}
+
+std::string to_text(const Diagnosis& d) {
+  std::string text = fmt::format("{}: {}\nmode: {}\n", to_string(d.verdict), verdict_sentence(d),
+                                 d.differential ? "differential, against the reference run"
+                                                : "absolute, against the declared model");
+  for (const FoundEffect& e : d.effects) {
+    std::string numbers;
+    for (const FittedNumber& n : e.numbers) {
+      const std::string key = e.name == "deviation" ? n.key : short_key(n.key, e.name);
+      numbers += fmt::format("{}{} = {}", numbers.empty() ? "" : ", ", key, with_interval(n));
+    }
+    text += fmt::format("  {}{}: {}; contour error {:+.3g} um rms\n", name_of(e),
+                        e.minor         ? " (minor)"
+                        : e.acquisition ? " (of the measurement)"
+                                        : "",
+                        numbers, e.contour_error_um);
+    if (!e.class_with.empty()) {
+      std::string others;
+      for (const std::string& c : e.class_with) others += (others.empty() ? "" : ", ") + c;
+      text += fmt::format(
+          "    or: {}{}\n", others,
+          e.separating_program.empty()
+              ? ""
+              : "; a run of `vcnc program " + e.separating_program + "` would tell them apart");
+    }
+  }
+  if (d.law && d.verdict != DiagnosisVerdict::unexplained) text += "  " + d.law->words + "\n";
+  text += figures_table(d.figures);
+  std::size_t blind = 0;
+  for (const Excitation& e : d.excitation) blind += !e.excited;
+  if (blind > 0)
+    text += fmt::format("this run cannot show {} of {} candidates; see the report\n", blind,
+                        d.excitation.size());
+  for (const std::string& n : d.notes) text += "note: " + n + "\n";
+  for (const std::string& w : d.warnings) text += "warning: " + w + "\n";
+  return text;
+}
+
+}  // namespace vcnc

@@ -1,0 +1,51 @@
+// What may be the matter with a machine: every effect of the library at every place it fits, and
+// every declared number that may be another one.
+//
+// A candidate is a set of machine-file keys with start values and bounds; trying it is setting them
+// on a copy of the declared machine. Left out are
+//
+// - effects that no prediction can show, with the reason: no_hypothesis() in effect_stage.hpp;
+// - wind-up and backlash of an axis whose motor side is next to nothing: there are no two masses;
+// - whole numbers (lobes, harmonics, poles per turn), which stay as the library has them, and so
+//   effects that have nothing but those: bus latency, which a command delay describes as well, and
+//   the slip of a period, which is sought by itself (period_slip_search.hpp);
+// - declared numbers that an effect stands for: gains, feed-forwards, force limit, torque constant,
+//   ball radius, positions of the rotary axes, of the piece and of the probe.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "model/machine.hpp"
+
+namespace vcnc {
+
+/// One number that a candidate frees.
+struct FreeNumber {
+  std::string key;     ///< "effects.X.backlash.gap_um"
+  double typical = 0;  ///< a size at which it shows, in the unit of the key
+  double min = 0, max = 0;
+  bool one_sided = false;  ///< its null value is at a bound
+};
+
+struct Candidate {
+  std::string effect;  ///< its name in the library; of a declared number: "deviation"
+  std::string place;   ///< "X", "geometry", "probe", ...; of a declared number: its key
+  std::vector<FreeNumber> numbers;
+  /// Numbers that a null effect leaves without a meaning and that are tried at several values: the
+  /// frequency of a vibration, the time constant of a drift.
+  std::vector<std::size_t> shape;  ///< indices into numbers
+
+  std::string name() const { return place.empty() ? effect : place + "." + effect; }
+};
+
+/// The candidates of a machine, in the order of the library. Those whose place the record has no
+/// signal of are left out by the caller.
+std::vector<Candidate> candidates(const Machine& declared);
+
+/// A machine with numbers outside [effects] other than declared, as a hypothesis: the declared
+/// machine, with the effects of `machine` and with a deviation for each of those numbers. Its
+/// controllers know what is declared, its bodies are as `machine` says.
+Machine as_hypothesis(const Machine& declared, const Machine& machine);
+
+}  // namespace vcnc

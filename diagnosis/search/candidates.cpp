@@ -1,0 +1,131 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "diagnosis/replica/effect_stage.hpp"
+#include "diagnosis/search/candidate.hpp"
+#include "model/effects/numbers.hpp"
+#include "model/parameters.hpp"
+
+namespace vcnc {
+namespace {
+
+constexpr double kLeastMotorShare = 1e-3;  // of the load: see AxisDrive
+constexpr double kDeviation = 0.1;         // typical, of the declared value
+
+/// Declared numbers that no effect stands for, by the end of their key.
+constexpr std::array<std::string_view, 8> kDeclared{".load_kg",
+                                                    ".load_kgm2",
+                                                    ".motor_inertia_kgm2",
+                                                    ".dead_time_ms",
+                                                    "probe.spring_rate_N_per_mm",
+                                                    "probe.damping_ratio",
+                                                    "probe.moving_mass_g",
+                                                    "probe.stylus_mass_g"};
+
+/// A component of a number of an effect.
+struct Component {
+  std::size_t number = 0;
+  int index = 0;
+};
+
+double in_unit(const EffectNumber& number, int index) {
+  return number.get(index) / number.unit.to_si;
+}
+
+/// A size of every component at which it shows: its nominal one, or the largest of its like.
+std::vector<double> typical_sizes(const std::vector<EffectNumber>& nominal,
+                                  const std::vector<Component>& components) {
+  std::vector<double> sizes;
+  for (const Component& c : components) {
+    double size = std::abs(in_unit(nominal[c.number], c.index));
+    for (const Component& like : components)
+      if (size == 0 && nominal[like.number].unit.suffix == nominal[c.number].unit.suffix)
+        size = std::max(size, std::abs(in_unit(nominal[like.number], like.index)));
+    sizes.push_back(size);
+  }
+  return sizes;
+}
+
+template <class Effect>
+void add_candidate(const EffectPlace& place, std::vector<Candidate>& all) {
+  Effect nominal = nominal_of<Effect>(place.rotary), null;
+  const std::vector<EffectNumber> at_nominal = numbers_of(nominal, place.rotary);
+  std::vector<Component> components;
+  for (std::size_t i = 0; i < at_nominal.size(); ++i)
+    for (int k = 0; k < at_nominal[i].size() && !at_nominal[i].whole(); ++k)
+      components.push_back({i, k});
+  const std::vector<double> sizes = typical_sizes(at_nominal, components);
+
+  Candidate candidate{std::string(Effect::text.name), std::string(place.name), {}, {}};
+  bool acts = false;
+  for (std::size_t c = 0; c < components.size(); ++c) {
+    const EffectNumber& number = at_nominal[components[c].number];
+    std::string key = "effects." + std::string(place.name) + "." + std::string(Effect::text.name) +
+                      "." + number.key;
+    if (number.size() > 1) key += std::string(".") + "xyz"[components[c].index];
+    // An amplitude makes an effect of nothing; anything else only shapes one.
+    Effect alone;
+    numbers_of(alone, place.rotary)[components[c].number].set(components[c].index, sizes[c]);
+    const bool amplitude = !alone.null();
+    acts = acts || amplitude;
+    if (!amplitude) candidate.shape.push_back(candidate.numbers.size());
+    const double at_null =
+        in_unit(numbers_of(null, place.rotary)[components[c].number], components[c].index);
+    candidate.numbers.push_back(
+        {std::move(key), sizes[c], number.range.min, number.range.max,
+         amplitude && (at_null <= number.range.min || at_null >= number.range.max)});
+  }
+  if (acts) all.push_back(std::move(candidate));
+}
+
+template <class Effect>
+bool can_be(const EffectPlace& place, const Machine& declared) {
+  if constexpr (std::is_same_v<typename Effect::Port, TransmissionPort>) {
+    const MechanicsParams& m = declared.axes[place.axis].mechanics;
+    return m.reflected_inertia() > kLeastMotorShare * m.load;
+  }
+  return true;
+}
+
+void add_deviations(const Machine& declared, std::vector<Candidate>& all) {
+  Machine machine = declared;
+  for (const Parameter& p : parameters(machine)) {
+    const bool known = std::any_of(kDeclared.begin(), kDeclared.end(),
+                                   [&](std::string_view end) { return p.key.ends_with(end); });
+    if (!known || p.key.starts_with("effects.") || *p.value == 0) continue;
+    all.push_back({"deviation",
+                   p.key,
+                   {{p.key, kDeviation * std::abs(p.in_unit()), p.range.min, p.range.max, false}},
+                   {}});
+  }
+}
+
+}  // namespace
+
+std::vector<Candidate> candidates(const Machine& declared) {
+  std::vector<Candidate> all;
+  for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
+    if (!no_hypothesis<Effect>().empty()) return;
+    for (const EffectPlace& place : places_of(Effect::place))
+      if (can_be<Effect>(place, declared)) add_candidate<Effect>(place, all);
+  });
+  add_deviations(declared, all);
+  return all;
+}
+
+Machine as_hypothesis(const Machine& declared, const Machine& machine) {
+  Machine hypothesis = declared, given = machine;
+  hypothesis.effects = machine.effects;
+  const std::vector<Parameter> before = parameters(hypothesis), after = parameters(given);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (*before[i].value == *after[i].value || before[i].key.starts_with("effects.")) continue;
+    std::vector<Deviation>& known = hypothesis.effects.deviations;
+    const bool already = std::any_of(known.begin(), known.end(),
+                                     [&](const Deviation& d) { return d.key == before[i].key; });
+    if (!already) known.push_back({before[i].key, after[i].in_unit()});
+  }
+  return hypothesis;
+}
+
+}  // namespace vcnc

@@ -1,0 +1,253 @@
+#include "diagnosis/search/evidence.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "diagnosis/search/parallel.hpp"
+#include "model/axes.hpp"
+
+namespace vcnc {
+namespace {
+
+/// An axis stands when its command moved less than this in each of the last and next 25 ms.
+constexpr double kStandingLinear = 0.2e-3, kStandingRotary = 0.2e-3;  // [m/s], [rad/s]
+
+/// sum of a b, in doubles and several at a time.
+double dot(const float* a, const float* b, std::size_t n) {
+  constexpr std::size_t kLanes = 8;
+  double sum[kLanes] = {};
+  std::size_t k = 0;
+  for (; k + kLanes <= n; k += kLanes)
+    for (std::size_t j = 0; j < kLanes; ++j)
+      sum[j] += static_cast<double>(a[k + j]) * static_cast<double>(b[k + j]);
+  for (; k < n; ++k) sum[0] += static_cast<double>(a[k]) * static_cast<double>(b[k]);
+  return ((sum[0] + sum[4]) + (sum[1] + sum[5])) + ((sum[2] + sum[6]) + (sum[3] + sum[7]));
+}
+
+}  // namespace
+
+bool Column::zero() const {
+  for (std::size_t c = 0; c < size(); ++c)
+    if (!(*channels_)[c].empty()) return false;
+  return true;
+}
+
+Evidence::Evidence(const Record& record, Replica& replica, const Machine& declared,
+                   double noise_scale)
+    : record_(record), replica_(replica), partition_(vcnc::partition(record)) {
+  const std::vector<ComparedChannel>& channels = replica.channels();
+  declared_ = replica.predict(declared);
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    const MeasuredSignal* signal = record.find(channels[c].kind, channels[c].axis);
+    if (!signal) throw std::logic_error("a replica predicts a channel that the record has not");
+    measured_.push_back(signal->value);
+    raw_valid_.emplace_back(record.samples());
+    for (std::size_t k = 0; k < record.samples(); ++k)
+      raw_valid_[c][k] = std::isfinite(measured_[c][k]) && std::isfinite(declared_[c][k]);
+  }
+  mask_standing();
+
+  SeriesOfChannels difference = measured_;
+  for (std::size_t c = 0; c < channels.size(); ++c)
+    for (std::size_t k = 0; k < difference[c].size(); ++k)
+      difference[c][k] = raw_valid_[c][k] ? measured_[c][k] - declared_[c][k] : kMissing;
+  noise_ = audit_noise(record, partition_, channels, difference);
+  for (ChannelNoise& channel : noise_.channels) channel.filter.scale *= noise_scale;
+
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    valid_.emplace_back(record.samples(), 0);
+    const std::size_t order = noise_.channels[c].filter.a.size();
+    for (const Block& block : partition_.blocks) {
+      std::size_t run = 0;  // valid samples before k
+      for (std::size_t k = block.begin; k-- > 0 && run < order && raw_valid_[c][k];) ++run;
+      for (std::size_t k = block.begin; k < block.end; ++k) {
+        valid_[c][k] = raw_valid_[c][k] && run >= order;
+        run = raw_valid_[c][k] ? run + 1 : 0;
+      }
+    }
+  }
+}
+
+void Evidence::mask_standing() {
+  const auto reach = static_cast<std::size_t>(std::round(0.025 / record_.period));
+  for (std::size_t c = 0; c < raw_valid_.size(); ++c) {
+    const ComparedChannel& channel = replica_.channels()[c];
+    if (channel.kind != SignalKind::force && channel.kind != SignalKind::twist) continue;
+    const MeasuredSignal* command = record_.find(SignalKind::command, channel.axis);
+    if (!command) continue;
+    const double slow = (is_rotary(channel.axis) ? kStandingRotary : kStandingLinear) *
+                        static_cast<double>(reach) * record_.period;
+    const std::vector<double>& q = command->value;
+    for (std::size_t k = 0; k < q.size(); ++k) {
+      const std::size_t before = k > reach ? k - reach : 0;
+      const std::size_t after = std::min(q.size() - 1, k + reach);
+      if (std::abs(q[k] - q[before]) < slow || std::abs(q[after] - q[k]) < slow)
+        raw_valid_[c][k] = 0;
+    }
+  }
+}
+
+Prediction Evidence::predict(const Machine& hypothesis) const {
+  return replica_.predict(hypothesis);
+}
+
+std::vector<float> Evidence::whiten(std::size_t channel, const std::vector<double>& series) const {
+  const WhiteningFilter& filter = noise_.channels[channel].filter;
+  std::vector<float> z(series.size(), 0.0F);
+  for (std::size_t k = 0; k < series.size(); ++k) {
+    if (!valid_[channel][k]) continue;
+    double v = series[k];
+    for (std::size_t j = 0; j < filter.a.size(); ++j) v -= filter.a[j] * series[k - 1 - j];
+    z[k] = static_cast<float>(v / filter.scale);
+  }
+  return z;
+}
+
+Column Evidence::residual(const Prediction& prediction) const {
+  Column::Channels column(prediction.size());
+  for (std::size_t c = 0; c < prediction.size(); ++c) {
+    std::vector<double> r(prediction[c].size(), 0.0);
+    for (std::size_t k = 0; k < r.size(); ++k) {
+      if (!raw_valid_[c][k]) continue;
+      // A hypothesis that says nothing where the declared machine does gains nothing by it.
+      const double predicted = std::isfinite(prediction[c][k]) ? prediction[c][k] : declared_[c][k];
+      r[k] = measured_[c][k] - predicted;
+    }
+    column[c] = whiten(c, r);
+  }
+  return column;
+}
+
+Column Evidence::sensitivity(const Prediction& base, const Prediction& changed, double step) const {
+  SeriesOfChannels change(base.size());
+  for (std::size_t c = 0; c < base.size(); ++c) {
+    if (changed[c].shares(base[c])) continue;
+    const std::vector<double>&after = changed[c], &before = base[c];
+    change[c].resize(before.size());
+    for (std::size_t k = 0; k < before.size(); ++k) change[c][k] = (after[k] - before[k]) / step;
+  }
+  return whiten(change);
+}
+
+Column Evidence::whiten(const SeriesOfChannels& change) const {
+  Column::Channels column(change.size());
+  for (std::size_t c = 0; c < change.size(); ++c) {
+    if (change[c].empty()) continue;
+    std::vector<double> d(change[c].size(), 0.0);
+    bool any = false;
+    for (std::size_t k = 0; k < d.size(); ++k) {
+      if (!raw_valid_[c][k] || !std::isfinite(change[c][k])) continue;
+      d[k] = change[c][k];
+      any = any || d[k] != 0;
+    }
+    if (any) column[c] = whiten(c, d);
+  }
+  return column;
+}
+
+double Evidence::count(std::size_t channel, Role role) const {
+  double n = 0;
+  for (const Block& block : partition_.blocks)
+    if (takes(block, role))
+      for (std::size_t k = block.begin; k < block.end; ++k) n += valid_[channel][k];
+  return n;
+}
+
+double Evidence::count(Role role) const {
+  double n = 0;
+  for (std::size_t c = 0; c < valid_.size(); ++c) n += count(c, role);
+  return n;
+}
+
+double Evidence::chi2(const Column& column, std::size_t channel, Role role) const {
+  double sum = 0;
+  if (column[channel].empty()) return 0;
+  for (const Block& block : partition_.blocks) {
+    if (!takes(block, role)) continue;
+    for (std::size_t k = block.begin; k < block.end; ++k) {
+      const double z = static_cast<double>(column[channel][k]);
+      sum += z * z;
+    }
+  }
+  return sum;
+}
+
+double Evidence::chi2(const Column& column, Role role) const {
+  double sum = 0;
+  for (std::size_t c = 0; c < column.size(); ++c) sum += chi2(column, c, role);
+  return sum;
+}
+
+double Evidence::rms(const Prediction& prediction, std::size_t channel, Role role) const {
+  double sum = 0, n = 0;
+  for (const Block& block : partition_.blocks) {
+    if (!takes(block, role)) continue;
+    for (std::size_t k = block.begin; k < block.end; ++k) {
+      const double r = measured_[channel][k] - prediction[channel][k];
+      if (!raw_valid_[channel][k] || !std::isfinite(r)) continue;
+      sum += r * r;
+      n += 1;
+    }
+  }
+  return n > 0 ? std::sqrt(sum / n) : 0;
+}
+
+BlockGrams Evidence::grams(const std::vector<const Column*>& columns) const {
+  const auto m = static_cast<Eigen::Index>(columns.size());
+  BlockGrams all(partition_.blocks.size());
+  parallel_for(all.size(), [&](std::size_t b) {
+    const Block& block = partition_.blocks[b];
+    const auto length = static_cast<Eigen::Index>(block.end - block.begin);
+    all[b] = Eigen::MatrixXd::Zero(m, m);
+    for (std::size_t c = 0; c < valid_.size(); ++c) {
+      std::vector<Eigen::Index> present;
+      for (Eigen::Index i = 0; i < m; ++i)
+        if (!(*columns[static_cast<std::size_t>(i)])[c].empty()) present.push_back(i);
+      if (present.empty()) continue;
+      const auto width = static_cast<Eigen::Index>(present.size());
+      Eigen::MatrixXd part(length, width);
+      for (Eigen::Index i = 0; i < width; ++i) {
+        const std::vector<float>& z =
+            (*columns[static_cast<std::size_t>(present[static_cast<std::size_t>(i)])])[c];
+        part.col(i) =
+            Eigen::Map<const Eigen::VectorXf>(z.data() + block.begin, length).cast<double>();
+      }
+      const Eigen::MatrixXd products = part.transpose() * part;
+      for (Eigen::Index i = 0; i < width; ++i)
+        for (Eigen::Index j = 0; j < width; ++j)
+          all[b](present[static_cast<std::size_t>(i)], present[static_cast<std::size_t>(j)]) +=
+              products(i, j);
+    }
+  });
+  return all;
+}
+
+RoleGrams Evidence::cross(const std::vector<const Column*>& a,
+                          const std::vector<const Column*>& b) const {
+  const auto rows = static_cast<Eigen::Index>(a.size()), cols = static_cast<Eigen::Index>(b.size());
+  RoleGrams all{Eigen::MatrixXd::Zero(rows, cols), Eigen::MatrixXd::Zero(rows, cols)};
+  for (std::size_t c = 0; c < valid_.size(); ++c) {
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::vector<float>& y = (*b[j])[c];
+      if (y.empty()) continue;
+      for (std::size_t i = 0; i < a.size(); ++i) {
+        const std::vector<float>& x = (*a[i])[c];
+        if (x.empty()) continue;
+        for (const Block& block : partition_.blocks)
+          (block.held_out ? all.held_out : all.fitted)(static_cast<Eigen::Index>(i),
+                                                       static_cast<Eigen::Index>(j)) +=
+              dot(&x[block.begin], &y[block.begin], block.end - block.begin);
+      }
+    }
+  }
+  return all;
+}
+
+Eigen::MatrixXd Evidence::sum(const BlockGrams& grams, Role role) const {
+  Eigen::MatrixXd total = Eigen::MatrixXd::Zero(grams.front().rows(), grams.front().cols());
+  for (std::size_t b = 0; b < grams.size(); ++b)
+    if (takes(partition_.blocks[b], role)) total += grams[b];
+  return total;
+}
+
+}  // namespace vcnc

@@ -1,0 +1,111 @@
+// Residuals and sensitivities of hypotheses in whitened form, and what sums of squares they have.
+//
+//   z(theta) = W (y - yhat(theta)),   J = W d yhat / d theta
+//
+// with W the whitening of every channel (noise_audit.hpp). All that fitting, choosing and judging
+// needs are products of such columns, kept per block of the partition: from them come chi-square on
+// fitted and held-out laps, normal equations, gains per condition and resampled laps.
+//
+// Masked are samples that are missing, those outside every stretch, and force and twist of an axis
+// that stands: stuck friction and the loop's integral are not predictable there.
+#pragma once
+
+#include <Eigen/Dense>
+#include <cstddef>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "diagnosis/records/record.hpp"
+#include "diagnosis/replica/replica.hpp"
+#include "diagnosis/search/noise_audit.hpp"
+#include "diagnosis/search/partition.hpp"
+
+namespace vcnc {
+
+/// Whitened numbers, one series per channel; a channel that is zero throughout is empty. They never
+/// change; copies share them.
+class Column {
+ public:
+  using Channels = std::vector<std::vector<float>>;
+
+  Column() = default;
+  Column(Channels channels) : channels_(std::make_shared<const Channels>(std::move(channels))) {}
+
+  std::size_t size() const { return channels_ ? channels_->size() : 0; }
+  const std::vector<float>& operator[](std::size_t channel) const { return (*channels_)[channel]; }
+  bool zero() const;
+  /// Whether both are the same numbers by being the same object.
+  bool shares(const Column& other) const { return channels_ == other.channels_; }
+
+ private:
+  std::shared_ptr<const Channels> channels_;
+};
+
+/// One series per channel in SI.
+using SeriesOfChannels = std::vector<std::vector<double>>;
+
+/// Products of columns, one matrix per block.
+using BlockGrams = std::vector<Eigen::MatrixXd>;
+
+/// Products summed over the fitted and over the held-out blocks.
+struct RoleGrams {
+  Eigen::MatrixXd fitted, held_out;
+};
+
+enum class Role { fitted, held_out, both };
+
+class Evidence {
+ public:
+  /// `declared` says which samples can be compared at all, and gives the residual whose repetitions
+  /// tell the noise; `noise_scale` is what its standard deviation grows by beyond what laps tell.
+  /// All arguments must outlive this.
+  Evidence(const Record& record, Replica& replica, const Machine& declared, double noise_scale = 1);
+
+  const Record& record() const { return record_; }
+  const Replica& replica() const { return replica_; }
+  const Partition& partition() const { return partition_; }
+  const NoiseAudit& noise() const { return noise_; }
+
+  Prediction predict(const Machine& hypothesis) const;
+  /// See Replica::anchor().
+  void anchor(const Machine& machine) { replica_.anchor(machine); }
+  /// W (y - yhat).
+  Column residual(const Prediction& prediction) const;
+  /// W (changed - base) / step.
+  Column sensitivity(const Prediction& base, const Prediction& changed, double step) const;
+  /// W d for a change of the prediction given as such.
+  Column whiten(const SeriesOfChannels& change) const;
+
+  /// Samples of a channel that count.
+  double count(std::size_t channel, Role role) const;
+  double count(Role role) const;
+  /// chi-square of one channel of a column.
+  double chi2(const Column& column, std::size_t channel, Role role) const;
+  double chi2(const Column& column, Role role) const;
+  /// RMS of y - yhat in SI over the samples that count.
+  double rms(const Prediction& prediction, std::size_t channel, Role role) const;
+
+  /// Products of all pairs of the columns, per block.
+  BlockGrams grams(const std::vector<const Column*>& columns) const;
+  Eigen::MatrixXd sum(const BlockGrams& grams, Role role) const;
+  /// Products of every `a` with every `b`, summed over the blocks of each role.
+  RoleGrams cross(const std::vector<const Column*>& a, const std::vector<const Column*>& b) const;
+
+ private:
+  bool takes(const Block& block, Role role) const {
+    return role == Role::both || block.held_out == (role == Role::held_out);
+  }
+  std::vector<float> whiten(std::size_t channel, const std::vector<double>& series) const;
+  void mask_standing();
+
+  const Record& record_;
+  Replica& replica_;
+  Partition partition_;
+  SeriesOfChannels measured_;
+  Prediction declared_;
+  std::vector<std::vector<char>> raw_valid_, valid_;
+  NoiseAudit noise_;
+};
+
+}  // namespace vcnc

@@ -1,0 +1,102 @@
+#include "diagnosis/search/freed_number.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "model/parameters.hpp"
+
+namespace vcnc {
+namespace {
+
+struct Tolerance {
+  std::string_view prefix, part;
+  double size;
+};
+
+constexpr Tolerance kTolerances[] = {
+    {"axes.", ".load_kg", 0.01},
+    {"axes.", ".motor_inertia_kgm2", 0.01},
+    {"effects.", ".coulomb.level", 0.03},
+    {"effects.", ".stribeck.excess", 0.10},
+    {"effects.", ".viscous.coefficient", 0.05},
+    {"effects.", ".presliding.stiffness", 0.10},
+    {"effects.", ".windup.compliance", 0.02},
+    {"effects.", ".backlash.gap", 0.02},
+};
+/// Tolerances in the unit of the key, of effects that are never quite absent.
+constexpr Tolerance kResidues[] = {
+    {"effects.setup.piece_offset.", ".shift_um", 100},
+    {"effects.setup.piece_tilt.", ".tilt_urad", 500},
+    {"effects.", ".scale_error.error_ppm", 1.5},
+    {"effects.probe.tip_radius.", ".larger_um", 1},
+    {"effects.X.", ".thermal_drift.offset_um", 3},
+    {"effects.Y.", ".thermal_drift.offset_um", 3},
+    {"effects.Z.", ".thermal_drift.offset_um", 3},
+};
+
+double tolerance_of(const std::string& key, double value) {
+  for (const Tolerance& t : kResidues)
+    if (key.starts_with(t.prefix) && key.find(t.part) != std::string::npos) return t.size;
+  for (const Tolerance& t : kTolerances)
+    if (key.starts_with(t.prefix) && key.find(t.part) != std::string::npos)
+      return t.size * std::abs(value);
+  return 0;
+}
+
+}  // namespace
+
+bool never_quite_absent(const std::string& key) {
+  return std::any_of(std::begin(kResidues), std::end(kResidues), [&](const Tolerance& t) {
+    return key.starts_with(t.prefix) && key.find(t.part) != std::string::npos;
+  });
+}
+
+double number_of(const Machine& machine, const std::string& key) {
+  Machine copy = machine;
+  for (const Parameter& p : parameters(copy))
+    if (p.key == key) return p.in_unit();
+  throw std::invalid_argument(key + ": is not a number of a machine file");
+}
+
+void move_number(Machine& machine, const std::string& key, double value) {
+  for (const Parameter& p : parameters(machine)) {
+    if (p.key != key) continue;
+    *p.value = std::clamp(value, p.range.min, p.range.max) * p.unit.to_si;
+    return;
+  }
+  throw std::invalid_argument(key + ": is not a number of a machine file");
+}
+
+Machine with(Machine machine, const std::vector<FreedNumber>& numbers) {
+  std::vector<Parameter> all = parameters(machine);
+  for (const FreedNumber& n : numbers) {
+    const auto p = std::find_if(all.begin(), all.end(),
+                                [&](const Parameter& q) { return q.key == n.number.key; });
+    if (p == all.end())
+      throw std::invalid_argument(n.number.key + ": is not a number of a machine file");
+    *p->value = std::clamp(n.value, p->range.min, p->range.max) * p->unit.to_si;
+  }
+  return machine;
+}
+
+std::vector<FreedNumber> nuisances(const Machine& declared) {
+  Machine copy = declared;
+  std::vector<FreedNumber> all;
+  for (const Parameter& p : parameters(copy)) {
+    const double value = p.in_unit(), tolerance = tolerance_of(p.key, value);
+    if (tolerance <= 0) continue;
+    // Counted in what is small, so that differences are taken near the declaration.
+    const bool clamped = p.key.starts_with("effects.setup.");
+    all.push_back({.number = {.key = p.key,
+                              .typical = clamped ? 10 : tolerance,
+                              .min = p.range.min,
+                              .max = p.range.max},
+                   .value = value,
+                   .centre = value,
+                   .tolerance = tolerance});
+  }
+  return all;
+}
+
+}  // namespace vcnc

@@ -1,0 +1,51 @@
+// Numbers of a machine that a fit may move, and moving them.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "diagnosis/search/candidate.hpp"
+#include "model/machine.hpp"
+
+namespace vcnc {
+
+/// A number with what is known of it, in the unit of its key. Fits count it in `number.typical`.
+struct FreedNumber {
+  FreeNumber number;
+  double value = 0;      ///< where it stands
+  double centre = 0;     ///< declared
+  double tolerance = 0;  ///< standard deviation of the declaration; 0: nothing is known
+  bool shape = false;    ///< frequency, time constant, ...: moved in small steps
+
+  double pull() const { return tolerance > 0 ? (value - centre) / tolerance : 0; }
+  /// Inverse variance of the declaration in units of the typical size.
+  double precision() const {
+    return tolerance > 0 ? number.typical * number.typical / (tolerance * tolerance) : 0;
+  }
+};
+
+/// In the unit of the key. Throws std::invalid_argument for an unknown key.
+double number_of(const Machine& machine, const std::string& key);
+/// Like set_parameter(), but what is out of range becomes the nearest that is allowed.
+void move_number(Machine& machine, const std::string& key, double value);
+Machine with(Machine machine, const std::vector<FreedNumber>& numbers);
+
+/// Declared numbers that are never exact, with their tolerances (standard deviations):
+///
+///   moving mass and inertia                    1 %
+///   friction levels of declared effects        3 % dry, 5 % viscous, 10 % break-away, pre-sliding
+///   compliance, play of declared effects       2 %
+///   where the piece was clamped                free (100 um, 500 urad); reported above 5 um
+///   scale of a linear axis                     1.5 ppm
+///   size of gauge and ball                     1 um
+///   drift of a linear axis                     3 um with 1200 s: 0.15 um/min
+///
+/// Only numbers that can show in the run matter; the others stay at their declaration by
+/// themselves.
+std::vector<FreedNumber> nuisances(const Machine& declared);
+
+/// Whether a number of an undeclared effect is among them: where the piece was clamped, drift, ...
+bool never_quite_absent(const std::string& key);
+
+}  // namespace vcnc

@@ -1,0 +1,356 @@
+#include "diagnosis/search/generic_laws.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/search/parallel.hpp"
+#include "model/axes.hpp"
+
+namespace vcnc {
+namespace {
+
+constexpr std::size_t kHats = 10;
+constexpr double kPulse = 2e-3;  // half width of the pulse [s]
+
+using Series = std::vector<double>;
+
+/// Motion of an axis as commanded, by central differences.
+struct Course {
+  Series position, velocity, acceleration;
+};
+
+Course course_of(const Series& q, double period) {
+  Course c{q, Series(q.size(), 0.0), Series(q.size(), 0.0)};
+  for (std::size_t k = 1; k + 1 < q.size(); ++k) {
+    c.velocity[k] = (q[k + 1] - q[k - 1]) / (2 * period);
+    c.acceleration[k] = (q[k + 1] - 2 * q[k] + q[k - 1]) / (period * period);
+  }
+  return c;
+}
+
+/// How the channels answer at one axis.
+struct Response {
+  bool moves = false;
+  SeriesOfChannels displacement;     ///< change per metre (or radian) of displacement
+  std::vector<Series> force;         ///< impulse response per newton, per channel
+  std::vector<char> through_motion;  ///< the channel sees the axis through its position
+};
+
+class Laws {
+ public:
+  Laws(const Evidence& evidence, const FittedMachine& at)
+      : evidence_(evidence), at_(at), period_(evidence.record().period) {
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      const MeasuredSignal* command = evidence.record().find(SignalKind::command, i);
+      courses_.push_back(command ? course_of(command->value, period_) : Course{});
+      const auto faster = [](double v) { return std::abs(v) > 0.2e-3; };
+      moves_.push_back(
+          std::any_of(courses_[i].velocity.begin(), courses_[i].velocity.end(), faster));
+    }
+    responses_.resize(kAxisCount);
+    parallel_for(kAxisCount, [&](std::size_t i) {
+      if (moves_[i]) responses_[i] = response_of(i);
+    });
+  }
+
+  /// All laws that are tried, without values.
+  std::vector<Law> all() const {
+    std::vector<Law> laws;
+    using Point = Law::Point;
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      if (!moves_[i]) continue;
+      const auto add = [&](Point point, Covariate over, std::size_t of, Covariate times) {
+        Law law;
+        law.axis = static_cast<Law::OfAxis>(i);
+        law.point = point;
+        law.over = over;
+        law.over_axis = static_cast<Law::OfAxis>(of);
+        law.times = times;
+        law.times_axis = static_cast<Law::OfAxis>(i);
+        law.at = knots(law);
+        if (law.at.size() == kHats) laws.push_back(law);
+      };
+      using enum Covariate;
+      for (const Point point : {Point::table_force, Point::displacement}) {
+        add(point, position, i, time);
+        add(point, position, i, sign);
+        add(point, velocity, i, time);
+        add(point, acceleration, i, time);
+        add(point, time, i, time);
+        add(point, time, i, sign);
+        add(point, time, i, position);
+      }
+      for (std::size_t j = 0; j < kAxisCount; ++j) {
+        if (j == i || !moves_[j]) continue;
+        for (const Covariate c : {position, velocity, acceleration})
+          add(Point::displacement, c, j, time);
+      }
+    }
+    return laws;
+  }
+
+  std::vector<Column> columns(const Law& law) const {
+    std::vector<Column> all;
+    for (std::size_t h = 0; h < law.at.size(); ++h) {
+      Law hat = law;
+      hat.value.assign(law.at.size(), 0.0);
+      hat.value[h] = 1;
+      all.push_back(evidence_.whiten(change(hat)));
+    }
+    return all;
+  }
+
+  const Course& course(Law::OfAxis axis) const { return courses_[static_cast<std::size_t>(axis)]; }
+
+ private:
+  double covariate(Covariate c, Law::OfAxis axis, std::size_t k) const {
+    const Course& of = course(axis);
+    switch (c) {
+      case Covariate::position:
+        return of.position[k];
+      case Covariate::velocity:
+        return of.velocity[k];
+      case Covariate::acceleration:
+        return of.acceleration[k];
+      case Covariate::sign:
+        return of.velocity[k] > 0 ? 1 : of.velocity[k] < 0 ? -1 : 0;
+      case Covariate::time:
+        break;
+    }
+    return evidence_.record().begin + static_cast<double>(k) * period_;
+  }
+
+  Series knots(const Law& law) const {
+    Series values;
+    for (const Block& block : evidence_.partition().blocks)
+      for (std::size_t k = block.begin; k < block.end; ++k)
+        if (const double v = covariate(law.over, law.over_axis, k); std::isfinite(v))
+          values.push_back(v);
+    if (values.size() < 100) return {};
+    // The outermost thousandth is left out: single peaks of the acceleration.
+    const auto quantile = [&](double share) {
+      const auto at = values.begin() +
+                      static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+      std::nth_element(values.begin(), at, values.end());
+      return *at;
+    };
+    const double low = quantile(0.001), high = quantile(0.999);
+    Series at;
+    if (!(high - low > 1e-9)) return at;
+    for (std::size_t h = 0; h < kHats; ++h)
+      at.push_back(low + (high - low) * static_cast<double>(h) / (kHats - 1));
+    return at;
+  }
+
+  Law pulse(std::size_t axis, double at, double size) const {
+    Law law;
+    law.axis = static_cast<Law::OfAxis>(axis);
+    law.point = Law::Point::table_force;
+    law.at = {at - kPulse, at, at + kPulse};
+    law.value = {0, size, 0};
+    return law;
+  }
+
+  Response response_of(std::size_t i) const {
+    Response r;
+    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
+    Law constant;
+    constant.axis = static_cast<Law::OfAxis>(i);
+    constant.point = Law::Point::displacement;
+    const double shift = is_rotary(i) ? 1e-6 : 1e-6;
+    constant.at = {0, 1};
+    constant.value = {shift, shift};
+    r.displacement = difference(constant, 1 / shift);
+
+    // A pulse where the axis moves fastest, so that friction does not hold it.
+    const Series& v = courses_[i].velocity;
+    std::size_t fastest = 0;
+    for (std::size_t k = 0; k < v.size(); ++k)
+      if (std::abs(v[k]) > std::abs(v[fastest])) fastest = k;
+    const double time = evidence_.record().begin + static_cast<double>(fastest) * period_;
+    const double size = is_rotary(i) ? 1 : 50;
+    const SeriesOfChannels answer = difference(pulse(i, time, size), period_ / (size * kPulse));
+    const auto length = static_cast<std::size_t>(std::round(0.3 / period_));
+    const auto lead = static_cast<std::size_t>(std::round(kPulse / period_));
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      r.through_motion.push_back(channels[c].kind == SignalKind::deflection);
+      Series h;
+      const bool own = channels[c].axis == i && channels[c].kind != SignalKind::deflection;
+      for (std::size_t k = 0; own && k < length && fastest + k < v.size() + lead; ++k) {
+        if (fastest + k < lead) continue;
+        h.push_back(answer[c][fastest + k - lead]);
+      }
+      r.force.push_back(std::move(h));
+    }
+    return r;
+  }
+
+  SeriesOfChannels difference(const Law& law, double scale) const {
+    Machine machine = at_.machine;
+    machine.effects.laws.push_back(law);
+    const Prediction p = evidence_.predict(machine);
+    SeriesOfChannels d;
+    for (std::size_t c = 0; c < p.size(); ++c) {
+      d.emplace_back(p[c].size());
+      for (std::size_t k = 0; k < p[c].size(); ++k)
+        d[c][k] = (p[c][k] - at_.prediction[c][k]) * scale;
+    }
+    return d;
+  }
+
+  /// y of a law at every sample.
+  Series strength(const Law& law) const {
+    Series y(evidence_.record().samples());
+    for (std::size_t k = 0; k < y.size(); ++k) {
+      const double m = law.times == Covariate::time ? 1 : covariate(law.times, law.times_axis, k);
+      y[k] = m * law.function(covariate(law.over, law.over_axis, k));
+      if (!std::isfinite(y[k])) y[k] = 0;
+    }
+    return y;
+  }
+
+  static Series convolved(const Series& y, const Series& h, std::size_t lead) {
+    Series out(y.size(), 0.0);
+    for (std::size_t k = 0; k < y.size(); ++k) {
+      if (y[k] == 0) continue;
+      for (std::size_t j = 0; j < h.size() && k + j < y.size() + lead; ++j)
+        if (k + j >= lead) out[k + j - lead] += y[k] * h[j];
+    }
+    return out;
+  }
+
+  SeriesOfChannels change(const Law& law) const {
+    const Response& r = responses_[law.axis_index()];
+    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
+    const Series y = strength(law);
+    SeriesOfChannels p(channels.size(), Series(y.size(), 0.0));
+    Series motion = y;
+    if (law.point == Law::Point::table_force) {
+      const auto lead = static_cast<std::size_t>(std::round(kPulse / period_));
+      motion.assign(y.size(), 0.0);
+      for (std::size_t c = 0; c < channels.size(); ++c) {
+        if (r.force[c].empty()) continue;
+        p[c] = convolved(y, r.force[c], lead);
+        if (channels[c].kind == SignalKind::position) motion = p[c];
+      }
+    }
+    for (std::size_t c = 0; c < channels.size(); ++c)
+      if (r.through_motion[c])
+        for (std::size_t k = 0; k < y.size(); ++k) p[c][k] = r.displacement[c][k] * motion[k];
+    return p;
+  }
+
+  const Evidence& evidence_;
+  const FittedMachine& at_;
+  double period_;
+  std::vector<Course> courses_;
+  std::vector<char> moves_;
+  std::vector<Response> responses_;
+};
+
+struct LinearLaw {
+  double gain = 0;
+  Eigen::VectorXd value, sigma;
+};
+
+LinearLaw fit(const Evidence& evidence, const Ground& ground, const std::vector<Column>& columns) {
+  std::vector<const Column*> own;
+  for (const Column& c : columns) own.push_back(&c);
+  const RoleGrams across = evidence.cross(ground.columns, own), among = evidence.cross(own, own);
+  const auto border = [](const Eigen::MatrixXd& a, const Eigen::MatrixXd& x,
+                         const Eigen::MatrixXd& b) {
+    Eigen::MatrixXd m(a.rows() + b.rows(), a.cols() + b.cols());
+    m << a, x, x.transpose(), b;
+    return m;
+  };
+  const Eigen::Index n = ground.precision.size(), k = among.fitted.rows();
+  Eigen::VectorXd precision = Eigen::VectorXd::Zero(n + k), offset = Eigen::VectorXd::Zero(n + k);
+  precision.head(n) = ground.precision;
+  offset.head(n) = ground.offset;
+  precision.tail(k).setConstant(1e-4 * among.fitted.diagonal().mean());
+  const Eigen::MatrixXd fitted = border(ground.grams.fitted, across.fitted, among.fitted);
+  const LinearStep s = linear_step(
+      fitted, border(ground.grams.held_out, across.held_out, among.held_out), precision, offset);
+  Eigen::MatrixXd a = fitted.bottomRightCorner(n + k, n + k);
+  a.diagonal() += precision;
+  LinearLaw law;
+  law.value = s.step.tail(k);
+  law.sigma = a.inverse().diagonal().tail(k).cwiseMax(0).cwiseSqrt();
+  // The ridge is no evidence: it is taken off what the priors of the step add up to.
+  const double ridge = precision[n] * law.value.squaredNorm();
+  law.gain = ground.held_out - (s.held_out - ridge);
+  return law;
+}
+
+}  // namespace
+
+std::string words_of(const Law& law) {
+  constexpr const char* points[] = {"command", "command time", "motor force",
+                                    "force",   "displacement", "reading"};
+  constexpr const char* letters[] = {"t", "q", "v", "a", "sgn v"};
+  const auto named = [&](Covariate c, Law::OfAxis axis) -> std::string {
+    if (c == Covariate::time) return "t";
+    return fmt::format("{}_{}", letters[static_cast<int>(c)],
+                       kAxisNames[static_cast<std::size_t>(axis)]);
+  };
+  std::string factor;
+  if (law.times == Covariate::sign)
+    factor = fmt::format("sgn(v_{}) ", kAxisNames[static_cast<std::size_t>(law.times_axis)]);
+  else if (law.times != Covariate::time)
+    factor = named(law.times, law.times_axis) + " ";
+  return fmt::format("{} on {} as {}f({})", points[static_cast<int>(law.point)],
+                     kAxisNames[law.axis_index()], factor, named(law.over, law.over_axis));
+}
+
+LawFit best_law(const Evidence& evidence, const FittedMachine& at,
+                const DiagnosisOptions& options) {
+  const Laws laws(evidence, at);
+  const LinearPart linear = at.linear();
+  const Ground ground(evidence, at.residual, linear);
+  const std::vector<Law> all = laws.all();
+  std::vector<LinearLaw> fits(all.size());
+  parallel_for(all.size(),
+               [&](std::size_t i) { fits[i] = fit(evidence, ground, laws.columns(all[i])); });
+
+  LawFit best;
+  best.machine = at.machine;
+  const double excess = std::max(1.0, ground.held_out - evidence.count(Role::held_out));
+  std::vector<std::size_t> order(all.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t x, std::size_t y) { return fits[x].gain > fits[y].gain; });
+  // The columns are a linearisation; the first three are asked what they do in the loop.
+  for (std::size_t rank = 0; rank < std::min<std::size_t>(3, order.size()); ++rank) {
+    const LinearLaw& f = fits[order[rank]];
+    if (f.gain < options.law_gain) break;
+    Law law = all[order[rank]];
+    law.value.assign(f.value.data(), f.value.data() + f.value.size());
+    Machine machine = at.machine;
+    machine.effects.laws.push_back(law);
+    const Column residual = evidence.residual(evidence.predict(machine));
+    const double gain = ground.held_out - Ground(evidence, residual, linear).held_out;
+    if (gain <= best.gain) continue;
+    best.gain = gain;
+    best.machine = std::move(machine);
+    law.label = "learned: " + words_of(law);
+    best.law.low.clear(), best.law.high.clear();
+    for (Eigen::Index h = 0; h < f.value.size(); ++h) {
+      best.law.low.push_back(f.value[h] - 1.96 * f.sigma[h]);
+      best.law.high.push_back(f.value[h] + 1.96 * f.sigma[h]);
+    }
+    best.law.words = "behaves like " + words_of(law);
+    best.law.share = std::min(1.0, gain / excess);
+    best.law.law = law;
+    best.machine.effects.laws.back() = law;
+  }
+  const double band = options.class_gain + options.class_share * excess;
+  for (const std::size_t i : order)
+    if (best.gain > 0 && fits[i].gain > best.gain - band &&
+        words_of(all[i]) != words_of(best.law.law) && best.law.not_distinguishable_from.size() < 5)
+      best.law.not_distinguishable_from.push_back(words_of(all[i]));
+  return best;
+}
+
+}  // namespace vcnc

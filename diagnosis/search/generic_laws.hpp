@@ -1,0 +1,35 @@
+// Laws without a name: what is left over as a function of something, through the closed loop.
+//
+//   y = m f(c),   f = sum of 10 hat functions over the range of the covariate c, with a small ridge
+//
+// at a point of an axis (model/effects/law.hpp): force on the table, displacement of the tool
+// centre, reading of the probe. m is 1, a sign of the velocity or a position. To first order the
+// closed loop answers a force by a convolution and a displacement at once, so that one pulse and
+// one constant law per axis, simulated, give the columns of every law. The best law is then
+// simulated itself; what it gains there on the held-out laps counts.
+//
+// Known limits: a law that only acts while an axis sticks is not linear; laws that differ by less
+// than the equivalence band (30 and 5 %) are told as such.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "diagnosis/report/diagnosis.hpp"
+#include "diagnosis/search/selection.hpp"
+
+namespace vcnc {
+
+struct LawFit {
+  LearnedLaw law;
+  double gain = 0;  ///< held-out chi-square, simulated
+  Machine machine;  ///< with the law
+};
+
+/// The best law on what `at` leaves, or one with gain 0.
+LawFit best_law(const Evidence& evidence, const FittedMachine& at, const DiagnosisOptions& options);
+
+/// "force on X as sgn(v_X) f(q_X)"
+std::string words_of(const Law& law);
+
+}  // namespace vcnc

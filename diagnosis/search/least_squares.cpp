@@ -1,0 +1,86 @@
+#include "diagnosis/search/least_squares.hpp"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace vcnc {
+namespace {
+
+/// The k + 1 residuals of the header.
+class Compressed : public ceres::CostFunction {
+ public:
+  Compressed(const LeastSquaresProblem& problem, int& evaluations)
+      : problem_(problem), evaluations_(evaluations) {
+    const int k = static_cast<int>(problem.start.size());
+    set_num_residuals(k + 1);
+    mutable_parameter_block_sizes()->push_back(k);
+  }
+
+  bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
+    const Eigen::Index k = problem_.start.size();
+    const bool derivatives = jacobians != nullptr && jacobians[0] != nullptr;
+    ++evaluations_;
+    const Linearisation at =
+        problem_.evaluate(Eigen::Map<const Eigen::VectorXd>(x[0], k), derivatives);
+    if (!std::isfinite(at.cost)) return false;
+    Eigen::Map<Eigen::VectorXd> r(residuals, k + 1);
+    r.setZero();
+    if (!derivatives) {
+      r[k] = std::sqrt(std::max(0.0, at.cost));
+      return true;
+    }
+    // A number without influence gets a pivot too small to matter.
+    Eigen::MatrixXd gram = at.gram;
+    gram.diagonal().array() += 1e-12 * (1 + gram.diagonal().maxCoeff());
+    const Eigen::LLT<Eigen::MatrixXd> factor(gram);
+    if (factor.info() != Eigen::Success) return false;
+    r.head(k) = factor.matrixL().solve(at.gradient);
+    r[k] = std::sqrt(std::max(0.0, at.cost - r.head(k).squaredNorm()));
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    Eigen::Map<RowMajor> jacobian(jacobians[0], k + 1, k);
+    jacobian.setZero();
+    jacobian.topRows(k) = Eigen::MatrixXd(factor.matrixU());
+    return true;
+  }
+
+ private:
+  const LeastSquaresProblem& problem_;
+  int& evaluations_;
+};
+
+}  // namespace
+
+LeastSquaresSolution solve(const LeastSquaresProblem& problem) {
+  LeastSquaresSolution solution;
+  solution.x = problem.start.cwiseMax(problem.min).cwiseMin(problem.max);
+  if (solution.x.size() == 0) {
+    solution.cost = problem.evaluate(solution.x, false).cost;
+    solution.converged = true;
+    return solution;
+  }
+  ceres::Problem ceres_problem;
+  double* x = solution.x.data();
+  ceres_problem.AddResidualBlock(new Compressed(problem, solution.evaluations), nullptr, x);
+  for (int i = 0; i < static_cast<int>(solution.x.size()); ++i) {
+    if (std::isfinite(problem.min[i])) ceres_problem.SetParameterLowerBound(x, i, problem.min[i]);
+    if (std::isfinite(problem.max[i])) ceres_problem.SetParameterUpperBound(x, i, problem.max[i]);
+  }
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.max_num_iterations = problem.max_iterations;
+  options.function_tolerance = problem.cost_tolerance;
+  options.parameter_tolerance = 1e-7;
+  options.gradient_tolerance = 1e-12;
+  options.initial_trust_region_radius = 1e6;  // the columns are scaled, so start as Gauss-Newton
+  options.logging_type = ceres::SILENT;
+  options.num_threads = 1;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &ceres_problem, &summary);
+  solution.cost = 2 * summary.final_cost;
+  solution.converged = summary.termination_type == ceres::CONVERGENCE;
+  return solution;
+}
+
+}  // namespace vcnc

@@ -1,0 +1,250 @@
+#include "diagnosis/search/noise_audit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <unsupported/Eigen/FFT>
+
+#include "model/axes.hpp"
+#include "model/math.hpp"
+
+namespace vcnc {
+namespace {
+
+using Series = std::vector<double>;
+
+/// What a replica that computes in another order than the machine cannot be better than [SI].
+double exactness(const ComparedChannel& channel, const Series& residual) {
+  switch (channel.kind) {
+    case SignalKind::position:
+    case SignalKind::twist:
+      return is_rotary(channel.axis) ? 5e-9 : 1e-9;
+    case SignalKind::deflection:
+      return 5e-9;
+    default:
+      break;
+  }
+  double largest = 0;
+  for (const double r : residual) largest = std::max(largest, std::isfinite(r) ? std::abs(r) : 0);
+  return std::max(1e-6, 1e-7 * largest);
+}
+
+/// Less its straight line; NaN stays.
+void remove_line(Series& d) {
+  double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+  for (std::size_t k = 0; k < d.size(); ++k) {
+    if (std::isnan(d[k])) continue;
+    const double x = static_cast<double>(k);
+    n += 1, sx += x, sy += d[k], sxx += x * x, sxy += x * d[k];
+  }
+  const double det = n * sxx - sx * sx;
+  if (n < 2 || det <= 0) return;
+  const double slope = (n * sxy - sx * sy) / det, offset = (sy - slope * sx) / n;
+  for (std::size_t k = 0; k < d.size(); ++k) d[k] -= offset + slope * static_cast<double>(k);
+}
+
+struct LapNoise {
+  Series value;
+  bool held_out = false;
+};
+
+/// d_i of every lap of every condition that was repeated.
+std::vector<LapNoise> lap_noise(const Partition& partition, const Series& residual) {
+  std::map<int, std::vector<const Stretch*>> laps;
+  for (const Stretch& s : partition.stretches) laps[s.condition].push_back(&s);
+  std::vector<LapNoise> all;
+  for (const auto& [condition, of] : laps) {
+    if (of.size() < 2) continue;
+    std::size_t length = of.front()->end - of.front()->begin;
+    for (const Stretch* s : of) length = std::min(length, s->end - s->begin);
+    const double n = static_cast<double>(of.size());
+    Series mean(length, 0.0);
+    for (const Stretch* s : of)
+      for (std::size_t k = 0; k < length; ++k) mean[k] += residual[s->begin + k] / n;
+    for (std::size_t i = 0; i < of.size(); ++i) {
+      LapNoise lap{Series(length), i % 2 == 1};
+      for (std::size_t k = 0; k < length; ++k)
+        lap.value[k] = (residual[of[i]->begin + k] - mean[k]) * std::sqrt(n / (n - 1));
+      remove_line(lap.value);
+      all.push_back(std::move(lap));
+    }
+  }
+  return all;
+}
+
+/// Autocovariances over all stretches without gaps.
+Series covariances(const std::vector<LapNoise>& laps) {
+  Series sum(kWhiteningOrder + 1, 0.0), count(kWhiteningOrder + 1, 0.0);
+  for (const LapNoise& lap : laps) {
+    for (std::size_t k = 0; k < lap.value.size(); ++k) {
+      for (std::size_t j = 0; j <= std::min(k, kWhiteningOrder); ++j) {
+        const double product = lap.value[k] * lap.value[k - j];
+        if (std::isnan(product)) continue;
+        sum[j] += product;
+        count[j] += 1;
+      }
+    }
+  }
+  // Divided by the count at lag 0 throughout, so that the Toeplitz matrix stays positive definite.
+  for (double& c : sum) c /= std::max(1.0, count[0]);
+  return sum;
+}
+
+/// Mean square of the filtered laps, those that are held out if there are any.
+double left_by(const WhiteningFilter& filter, const std::vector<LapNoise>& laps) {
+  const bool all = std::none_of(laps.begin(), laps.end(), [](const auto& l) { return l.held_out; });
+  double sum = 0, count = 0;
+  for (const LapNoise& lap : laps) {
+    if (!all && !lap.held_out) continue;
+    for (std::size_t k = filter.a.size(); k < lap.value.size(); ++k) {
+      double z = lap.value[k];
+      for (std::size_t j = 0; j < filter.a.size(); ++j) z -= filter.a[j] * lap.value[k - 1 - j];
+      if (std::isnan(z)) continue;
+      sum += z * z;
+      count += 1;
+    }
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+/// Mean periodogram of the laps, all padded to one length.
+Series periodogram(const std::vector<LapNoise>& laps) {
+  std::size_t longest = 0;
+  for (const LapNoise& lap : laps) longest = std::max(longest, lap.value.size());
+  std::size_t n = 1;
+  while (n < longest) n *= 2;
+  Series power(n / 2, 0.0);
+  Eigen::FFT<double> fft;
+  for (const LapNoise& lap : laps) {
+    Series padded(n, 0.0);
+    const double size = static_cast<double>(lap.value.size());
+    for (std::size_t k = 0; k < lap.value.size(); ++k) {
+      const double window = 0.5 - 0.5 * std::cos(2 * kPi * (static_cast<double>(k) + 0.5) / size);
+      padded[k] = std::isnan(lap.value[k]) ? 0 : lap.value[k] * window;
+    }
+    std::vector<std::complex<double>> spectrum;
+    fft.fwd(spectrum, padded);
+    for (std::size_t k = 0; k < power.size(); ++k) power[k] += std::norm(spectrum[k]) / size;
+  }
+  return power;
+}
+
+double running_median(const Series& power, std::size_t at) {
+  constexpr std::size_t kReach = 60;
+  const std::size_t begin = at > kReach ? at - kReach : 1;
+  const std::size_t end = std::min(power.size(), at + kReach + 1);
+  Series part(power.begin() + static_cast<std::ptrdiff_t>(begin),
+              power.begin() + static_cast<std::ptrdiff_t>(end));
+  const auto middle = part.begin() + static_cast<std::ptrdiff_t>(part.size() / 2);
+  std::nth_element(part.begin(), middle, part.end());
+  return *middle;
+}
+
+/// Those of an amplitude of more than `least` [SI].
+std::vector<NoiseLine> find_lines(const ComparedChannel& channel, const std::vector<LapNoise>& laps,
+                                  double period, double least) {
+  constexpr double kStrength = 40;
+  constexpr std::size_t kLowest = 8;
+  std::vector<NoiseLine> lines;
+  const Series power = periodogram(laps);
+  if (power.size() < 128) return lines;
+  const double bin = 1 / (period * 2 * static_cast<double>(power.size()));
+  const double mean_lap = std::accumulate(laps.begin(), laps.end(), 0.0,
+                                          [](double s, const LapNoise& l) {
+                                            return s + static_cast<double>(l.value.size());
+                                          }) /
+                          static_cast<double>(laps.size());
+  for (std::size_t k = kLowest; k + 1 < power.size(); ++k) {
+    if (power[k] < power[k - 1] || power[k] <= power[k + 1]) continue;
+    const double median = running_median(power, k);
+    if (median <= 0 || power[k] < kStrength * median) continue;
+    // Vertex of the parabola through the logarithms of three bins.
+    const double l = std::log(power[k - 1]), c = std::log(power[k]), r = std::log(power[k + 1]);
+    const double shift = 0.5 * (l - r) / (l - 2 * c + r);
+    const double frequency = (static_cast<double>(k) + shift) * bin;
+    // A sine of amplitude A has |X|^2/n = n (A/4)^2 under this window.
+    const double amplitude = 4 * std::sqrt(power[k] / static_cast<double>(laps.size()) / mean_lap);
+    if (amplitude > least) lines.push_back({channel, frequency, power[k] / median, amplitude});
+  }
+  std::sort(lines.begin(), lines.end(),
+            [](const NoiseLine& x, const NoiseLine& y) { return x.strength > y.strength; });
+  if (lines.size() > 3) lines.resize(3);
+  return lines;
+}
+
+double resolution_of(const Record& record, const ComparedChannel& channel) {
+  const MeasuredSignal* signal = record.find(channel.kind, channel.axis);
+  return signal ? signal->resolution : 0;
+}
+
+}  // namespace
+
+WhiteningFilter fit_autoregression(const std::vector<double>& covariance) {
+  WhiteningFilter filter;
+  const std::size_t order = covariance.empty() ? 0 : covariance.size() - 1;
+  if (order == 0 || covariance[0] <= 0) return filter;
+  std::vector<double> a;
+  double error = covariance[0] * (1 + 1e-9);
+  for (std::size_t m = 0; m < order; ++m) {
+    double reflection = covariance[m + 1];
+    for (std::size_t j = 0; j < m; ++j) reflection -= a[j] * covariance[m - j];
+    reflection /= error;
+    std::vector<double> next(m + 1);
+    for (std::size_t j = 0; j < m; ++j) next[j] = a[j] - reflection * a[m - 1 - j];
+    next[m] = reflection;
+    a = std::move(next);
+    error *= 1 - reflection * reflection;
+  }
+  filter.a = std::move(a);
+  filter.scale = std::sqrt(error);
+  return filter;
+}
+
+NoiseAudit audit_noise(const Record& record, const Partition& partition,
+                       const std::vector<ComparedChannel>& channels,
+                       const std::vector<std::vector<double>>& residual) {
+  NoiseAudit audit;
+  audit.from_repetitions = partition.repeated;
+  if (!partition.repeated)
+    audit.warnings.push_back(
+        "No motion was repeated: the noise was estimated from the residual itself, which "
+        "underrates "
+        "every effect; how much is left unexplained cannot be told.");
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    std::vector<LapNoise> laps = lap_noise(partition, residual[c]);
+    if (laps.empty()) {
+      bool odd = false;
+      for (const Stretch& s : partition.stretches) {
+        LapNoise lap{Series(residual[c].begin() + static_cast<std::ptrdiff_t>(s.begin),
+                            residual[c].begin() + static_cast<std::ptrdiff_t>(s.end)),
+                     odd = !odd};
+        remove_line(lap.value);
+        laps.push_back(std::move(lap));
+      }
+    }
+    Series covariance = covariances(laps);
+    const double resolution = resolution_of(record, channels[c]);
+    const double least = resolution * resolution / 12 +
+                         exactness(channels[c], residual[c]) * exactness(channels[c], residual[c]);
+    ChannelNoise noise;
+    noise.rms = std::sqrt(std::max(covariance[0], least));
+    const bool quiet = covariance[0] < least;
+    if (quiet) covariance[0] = least;
+    noise.filter = fit_autoregression(covariance);
+    const double expected = noise.filter.scale * noise.filter.scale;
+    const double left = left_by(noise.filter, laps);
+    noise.whiteness = expected / covariance[0];
+    // Where the laps are quieter than the channel can be, what it can be counts.
+    noise.filter.scale = std::sqrt(quiet ? expected : left);
+    if (audit.from_repetitions) {
+      const std::vector<NoiseLine> lines =
+          find_lines(channels[c], laps, record.period, 0.1 * std::sqrt(least));
+      audit.lines.insert(audit.lines.end(), lines.begin(), lines.end());
+    }
+    audit.channels.push_back(std::move(noise));
+  }
+  return audit;
+}
+
+}  // namespace vcnc

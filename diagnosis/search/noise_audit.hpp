@@ -1,0 +1,66 @@
+// What of a record is noise: taken from repetitions, never from a formula.
+//
+// The laps of one condition differ by noise only. With r_i the residual of lap i of n and m their
+// mean, d_i = (r_i - m) sqrt(n/(n-1)) less its straight line has the statistics of the noise. An
+// autoregressive filter of order 12 is fitted to all d_i of a channel (Yule-Walker equations,
+// solved by Levinson's recursion; Kay, Modern Spectral Estimation, 1988, ch. 7); it whitens:
+//
+//   z_k = (r_k - sum_j a_j r_{k-j}) / s,   s such that the d_i of the held-out laps have variance 1
+//
+// so that chi-square per sample is 1 where nothing but noise is left. A disturbance that does not
+// repeat (hum, vibration) belongs to that noise; it is seen as a line in the periodogram of d_i,
+// 40 times above the running median.
+//
+// A channel can never be quieter than its own step (q^2/12, Widrow 1956), nor than the replica is
+// exact. Without repetitions the filter is fitted to the residual itself: all it can predict from
+// its own past counts as noise, so that effects are underrated, not overrated.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "diagnosis/records/record.hpp"
+#include "diagnosis/replica/replica.hpp"
+#include "diagnosis/search/partition.hpp"
+
+namespace vcnc {
+
+inline constexpr std::size_t kWhiteningOrder = 12;
+
+/// Linear prediction filter of one channel with the scale of what it leaves.
+struct WhiteningFilter {
+  std::vector<double> a;  ///< z_k = (r_k - sum_j a[j] r_{k-1-j}) / scale
+  double scale = 1;
+};
+
+/// Fits a filter to the autocovariances c[0..order] by Levinson's recursion.
+WhiteningFilter fit_autoregression(const std::vector<double>& covariance);
+
+/// A periodic disturbance that does not repeat with the laps.
+struct NoiseLine {
+  ComparedChannel channel;
+  double frequency = 0;  ///< [Hz]
+  double strength = 0;   ///< power over the running median
+  double amplitude = 0;  ///< [SI of the channel]
+};
+
+struct ChannelNoise {
+  WhiteningFilter filter;
+  double rms = 0;  ///< of the noise [SI]
+  double whiteness =
+      1;  ///< variance of the held-out noise after the filter over that before: 1 is white
+};
+
+struct NoiseAudit {
+  std::vector<ChannelNoise> channels;
+  std::vector<NoiseLine> lines;
+  bool from_repetitions = false;
+  std::vector<std::string> warnings;
+};
+
+/// `residual` is one series per channel, NaN where there is nothing to compare.
+NoiseAudit audit_noise(const Record& record, const Partition& partition,
+                       const std::vector<ComparedChannel>& channels,
+                       const std::vector<std::vector<double>>& residual);
+
+}  // namespace vcnc

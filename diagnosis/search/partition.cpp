@@ -1,0 +1,61 @@
+#include "diagnosis/search/partition.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+namespace vcnc {
+namespace {
+
+/// Pieces of equal length, a few per condition, for a record that nobody divided.
+std::vector<Stretch> even_stretches(std::size_t samples) {
+  constexpr std::size_t kPieces = 24, kPerCondition = 4;
+  std::vector<Stretch> all;
+  for (std::size_t i = 0; i < kPieces; ++i) {
+    const std::size_t begin = samples * i / kPieces, end = samples * (i + 1) / kPieces;
+    if (end > begin)
+      all.push_back({begin, end, static_cast<int>(i / kPerCondition),
+                     static_cast<int>(i % kPerCondition), "piece " + std::to_string(i + 1)});
+  }
+  return all;
+}
+
+}  // namespace
+
+std::size_t Partition::conditions() const {
+  std::set<int> all;
+  for (const Stretch& s : stretches) all.insert(s.condition);
+  return all.size();
+}
+
+Partition partition(const Record& record) {
+  Partition p;
+  p.stretches = record.stretches;
+  std::map<int, int> repetitions;
+  for (const Stretch& s : p.stretches) ++repetitions[s.condition];
+  p.repeated = std::any_of(repetitions.begin(), repetitions.end(),
+                           [](const auto& c) { return c.second > 1; });
+  if (p.stretches.empty()) p.stretches = even_stretches(record.samples());
+
+  const auto second =
+      static_cast<std::size_t>(std::max(1.0, std::round(1 / std::max(record.period, 1e-9))));
+  std::map<int, int> seen;
+  int singles = 0;
+  for (std::size_t i = 0; i < p.stretches.size(); ++i) {
+    const Stretch& s = p.stretches[i];
+    const std::size_t length = s.end - s.begin;
+    const std::size_t pieces = std::max<std::size_t>(1, (length + second / 2) / second);
+    const bool once = p.repeated && repetitions[s.condition] == 1;
+    const int lap = seen[s.condition]++;
+    for (std::size_t k = 0; k < pieces; ++k) {
+      // What was run once is held out in pieces.
+      const bool held_out = once ? singles++ % 2 == 1 : lap % 2 == 1;
+      p.blocks.push_back({s.begin + length * k / pieces, s.begin + length * (k + 1) / pieces, i,
+                          s.condition, held_out});
+    }
+  }
+  return p;
+}
+
+}  // namespace vcnc

@@ -1,0 +1,33 @@
+// What of a record is fitted and what is held out.
+//
+// Effects are chosen and judged on data they were not fitted to. Of every condition every other
+// repetition is held out; a record without repetitions is cut into pieces which are fitted and held
+// out in turn. Conditions, not samples, are the unit of evidence: see selection.hpp.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "diagnosis/records/record.hpp"
+
+namespace vcnc {
+
+/// At most a second of one stretch.
+struct Block {
+  std::size_t begin = 0, end = 0;  ///< samples [begin, end)
+  std::size_t stretch = 0;         ///< index into the stretches of the partition
+  int condition = 0;
+  bool held_out = false;
+};
+
+struct Partition {
+  std::vector<Stretch> stretches;  ///< of the record, or made up where it has none
+  std::vector<Block> blocks;       ///< in order of time
+  bool repeated = false;           ///< some condition was run more than once
+
+  std::size_t conditions() const;
+};
+
+Partition partition(const Record& record);
+
+}  // namespace vcnc

@@ -1,0 +1,61 @@
+#include "diagnosis/search/period_slip_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vcnc {
+namespace {
+
+using Series = std::vector<double>;
+
+constexpr std::size_t kReach = 5;  // samples on either side
+constexpr double kOff = 0.15;      // of a period
+constexpr double kQuietBeside = 0.3;
+
+/// Mean of the samples from k on less the mean of those before; NaN where one is missing.
+double step_at(const Series& r, std::size_t k) {
+  double step = 0;
+  for (std::size_t i = 0; i < kReach; ++i) step += r[k + i] - r[k - 1 - i];
+  return step / kReach;
+}
+
+/// Whole periods in a step, 0: it is none.
+int periods_in(double step, double period) {
+  const double n = std::round(step / period);
+  return std::abs(step / period - n) < kOff ? static_cast<int>(n) : 0;
+}
+
+}  // namespace
+
+std::optional<PeriodSlip> find_period_slip(const Record& record,
+                                           const std::vector<ComparedChannel>& channels,
+                                           const Prediction& predicted, double period) {
+  std::vector<Series> residual;
+  std::vector<int> channel;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    if (channels[c].kind != SignalKind::deflection) continue;
+    Series r = record.find(channels[c].kind, channels[c].axis)->value;
+    for (std::size_t k = 0; k < r.size(); ++k) r[k] -= predicted[c][k];
+    residual.push_back(std::move(r));
+    channel.push_back(static_cast<int>(channels[c].axis));
+  }
+  std::optional<PeriodSlip> found;
+  for (std::size_t c = 0; c < residual.size(); ++c) {
+    const Series& r = residual[c];
+    for (std::size_t k = kReach; k + kReach <= r.size(); ++k) {
+      const int n = periods_in(r[k] - r[k - 1], period);
+      if (n == 0 || periods_in(step_at(r, k), period) != n) continue;
+      const bool alone = std::all_of(residual.begin(), residual.end(), [&](const Series& other) {
+        return &other == &r || !(std::abs(other[k] - other[k - 1]) > kQuietBeside * period);
+      });
+      if (!alone) continue;
+      if (found) return std::nullopt;
+      found = PeriodSlip{.periods = n,
+                         .channel = channel[c],
+                         .start = record.begin + static_cast<double>(k) * record.period};
+    }
+  }
+  return found;
+}
+
+}  // namespace vcnc

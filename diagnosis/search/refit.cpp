@@ -1,0 +1,220 @@
+#include "diagnosis/search/refit.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/search/parallel.hpp"
+
+namespace vcnc {
+namespace {
+
+std::vector<FreedNumber> moved(std::vector<FreedNumber> numbers, const Eigen::VectorXd& x) {
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    numbers[i].value = x[static_cast<Eigen::Index>(i)] * numbers[i].number.typical;
+  return numbers;
+}
+
+std::vector<const Column*> pointers(const Column& first, const std::vector<Column>& second,
+                                    const std::vector<Column>& third) {
+  std::vector<const Column*> all{&first};
+  for (const Column& c : second) all.push_back(&c);
+  for (const Column& c : third) all.push_back(&c);
+  return all;
+}
+
+/// One point of the search, kept so that asking again for its derivatives costs no simulation.
+struct Point {
+  Eigen::VectorXd x;
+  Prediction prediction;
+  Column residual;
+  std::vector<Column> columns;
+};
+
+/// Solves for the linear numbers at z; products of [z, J..., N...].
+struct Eliminated {
+  double cost = 0;
+  Eigen::VectorXd step;
+  Eigen::VectorXd gradient;
+  Eigen::MatrixXd gram;
+};
+
+Eliminated eliminate(const Eigen::MatrixXd& g, Eigen::Index live, const LinearPart& linear) {
+  const Eigen::Index n = static_cast<Eigen::Index>(linear.numbers.size());
+  const Eigen::VectorXd precision = linear.precision(), offset = linear.offset();
+  Eliminated e;
+  e.cost = g(0, 0) + offset.dot(precision.cwiseProduct(offset));
+  const Eigen::MatrixXd jj = g.block(1, 1, live, live);
+  const Eigen::VectorXd jz = g.block(1, 0, live, 1);
+  e.gradient = -jz;
+  e.gram = jj;
+  if (n == 0) return e;
+  Eigen::MatrixXd a = g.block(1 + live, 1 + live, n, n);
+  a.diagonal() += precision;
+  a.diagonal().array() += 1e-12 * (1 + a.diagonal().maxCoeff());
+  const Eigen::VectorXd b =
+      g.block(1 + live, 0, n, 1) - Eigen::VectorXd(precision.cwiseProduct(offset));
+  const Eigen::LDLT<Eigen::MatrixXd> factor(a);
+  e.step = factor.solve(b);
+  e.cost -= b.dot(e.step);
+  if (live > 0) {
+    const Eigen::MatrixXd nj = g.block(1 + live, 1, n, live);
+    e.gradient += nj.transpose() * e.step;
+    e.gram -= nj.transpose() * factor.solve(nj);
+  }
+  return e;
+}
+
+}  // namespace
+
+Eigen::VectorXd LinearPart::precision() const {
+  Eigen::VectorXd p(static_cast<Eigen::Index>(numbers.size()));
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    p[static_cast<Eigen::Index>(i)] = numbers[i].precision();
+  return p;
+}
+
+Eigen::VectorXd LinearPart::offset() const {
+  Eigen::VectorXd o(static_cast<Eigen::Index>(numbers.size()));
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    o[static_cast<Eigen::Index>(i)] =
+        (numbers[i].value - numbers[i].centre) / numbers[i].number.typical;
+  return o;
+}
+
+LinearPart without(const LinearPart& part, const std::vector<FreedNumber>& live) {
+  LinearPart left;
+  for (std::size_t i = 0; i < part.numbers.size(); ++i) {
+    const std::string& key = part.numbers[i].number.key;
+    if (std::any_of(live.begin(), live.end(),
+                    [&](const FreedNumber& n) { return n.number.key == key; }))
+      continue;
+    left.numbers.push_back(part.numbers[i]);
+    left.columns.push_back(part.columns[i]);
+  }
+  return left;
+}
+
+LinearStep linear_step(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& held_out,
+                       const Eigen::VectorXd& precision, const Eigen::VectorXd& offset) {
+  const Eigen::Index n = precision.size();
+  LinearStep s;
+  Eigen::MatrixXd a = fitted.block(1, 1, n, n);
+  a.diagonal() += precision;
+  a.diagonal().array() += 1e-10 * (1e-6 + a.diagonal().array());
+  const Eigen::VectorXd b =
+      fitted.block(1, 0, n, 1) - Eigen::VectorXd(precision.cwiseProduct(offset));
+  s.step = n > 0 ? Eigen::VectorXd(a.ldlt().solve(b)) : Eigen::VectorXd();
+  const Eigen::VectorXd at = offset + s.step;
+  const double prior = at.dot(precision.cwiseProduct(at));
+  const auto left = [&](const Eigen::MatrixXd& g) {
+    return g(0, 0) - 2 * s.step.dot(g.block(1, 0, n, 1).col(0)) +
+           s.step.dot(g.block(1, 1, n, n) * s.step) + prior;
+  };
+  s.fitted = left(fitted);
+  s.held_out = left(held_out);
+  return s;
+}
+
+Column column_of(const Evidence& evidence, const Machine& machine, const Prediction& base,
+                 const FreedNumber& n) {
+  double step = n.shape ? 1e-4 * std::max(std::abs(n.value), 1e-3 * n.number.typical)
+                        : std::clamp(0.1 * std::abs(n.value), 0.01 * n.number.typical,
+                                     0.1 * n.number.typical);
+  if (n.value + step > n.number.max) step = -step;
+  Machine changed = machine;
+  move_number(changed, n.number.key, n.value + step);
+  return evidence.sensitivity(base, evidence.predict(changed), step / n.number.typical);
+}
+
+Refit refit(const Evidence& evidence, const Machine& start, const std::vector<FreedNumber>& live,
+            const LinearPart& linear, int max_iterations) {
+  Refit result;
+  const auto k = static_cast<Eigen::Index>(live.size());
+  std::vector<Point> points;  // the last one and the best one are asked for again
+
+  const auto visit = [&](const Eigen::VectorXd& x, bool derivatives) -> Point& {
+    auto p = std::find_if(points.begin(), points.end(), [&](const Point& q) { return q.x == x; });
+    if (p == points.end()) {
+      if (points.size() > 1) points.erase(points.begin());
+      Point fresh;
+      fresh.x = x;
+      fresh.prediction = evidence.predict(with(start, moved(live, x)));
+      fresh.residual = evidence.residual(fresh.prediction);
+      ++result.simulations;
+      points.push_back(std::move(fresh));
+      p = std::prev(points.end());
+    }
+    if (derivatives && p->columns.empty() && k > 0) {
+      const std::vector<FreedNumber> at = moved(live, x);
+      const Machine machine = with(start, at);
+      p->columns.resize(live.size());
+      parallel_for(live.size(), [&](std::size_t i) {
+        p->columns[i] = column_of(evidence, machine, p->prediction, at[i]);
+      });
+      result.simulations += static_cast<int>(live.size());
+    }
+    return *p;
+  };
+
+  LeastSquaresProblem problem;
+  problem.start.resize(k), problem.min.resize(k), problem.max.resize(k);
+  problem.max_iterations = max_iterations;
+  for (std::size_t i = 0; i < live.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const double unit = live[i].number.typical;
+    problem.start[at] = live[i].value / unit;
+    problem.min[at] = std::min(live[i].number.min / unit, live[i].number.max / unit);
+    problem.max[at] = std::max(live[i].number.min / unit, live[i].number.max / unit);
+  }
+  problem.evaluate = [&](const Eigen::VectorXd& x, bool derivatives) {
+    const Point& p = visit(x, derivatives);
+    const std::vector<Column> none;
+    const Eigen::Index used = derivatives ? k : 0;
+    const Eigen::MatrixXd g = evidence.sum(
+        evidence.grams(pointers(p.residual, derivatives ? p.columns : none, linear.columns)),
+        Role::fitted);
+    const Eliminated e = eliminate(g, used, linear);
+    Linearisation at{e.cost, {}, {}};
+    if (derivatives) {
+      at.gradient = e.gradient;
+      at.gram = e.gram;
+    }
+    // What is known of the live numbers themselves.
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      const double precision = live[i].precision();
+      if (precision == 0) continue;
+      const auto j = static_cast<Eigen::Index>(i);
+      const double offset = x[j] - live[i].centre / live[i].number.typical;
+      at.cost += precision * offset * offset;
+      if (!derivatives) continue;
+      at.gradient[j] += precision * offset;
+      at.gram(j, j) += precision;
+    }
+    return at;
+  };
+  const LeastSquaresSolution solution = solve(problem);
+
+  Point& best = visit(solution.x, true);
+  const BlockGrams grams = evidence.grams(pointers(best.residual, {}, linear.columns));
+  const LinearStep step =
+      linear_step(evidence.sum(grams, Role::fitted), evidence.sum(grams, Role::held_out),
+                  linear.precision(), linear.offset());
+  result.live = moved(live, solution.x);
+  result.linear = linear.numbers;
+  for (std::size_t i = 0; i < result.linear.size(); ++i) {
+    FreedNumber& n = result.linear[i];
+    n.value += step.step[static_cast<Eigen::Index>(i)] * n.number.typical;
+  }
+  result.machine = with(with(start, result.live), result.linear);
+  double prior = 0;
+  for (const FreedNumber& n : result.live) prior += n.pull() * n.pull();
+  result.fitted = step.fitted + prior;
+  result.held_out = step.held_out + prior;
+  result.prediction = std::move(best.prediction);
+  result.residual = std::move(best.residual);
+  result.columns = std::move(best.columns);
+  result.linear_step = step.step;
+  return result;
+}
+
+}  // namespace vcnc

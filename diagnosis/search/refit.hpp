@@ -1,0 +1,61 @@
+// The best values of a few numbers with all others along.
+//
+// `live` numbers are simulated; `linear` ones (nuisances, effects found before) move along their
+// columns and are eliminated exactly (variable projection: Golub & Pereyra 1973):
+//
+//   min over x, d of |z(x) - N d|^2 + (o + d)' P (o + d)
+//
+// with o the present distance of the linear numbers from their declaration and P their precision.
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "diagnosis/search/evidence.hpp"
+#include "diagnosis/search/freed_number.hpp"
+#include "diagnosis/search/least_squares.hpp"
+
+namespace vcnc {
+
+/// Numbers with the columns d yhat / d number, per typical size.
+struct LinearPart {
+  std::vector<FreedNumber> numbers;
+  std::vector<Column> columns;
+
+  Eigen::VectorXd precision() const;
+  Eigen::VectorXd offset() const;  ///< from the declaration, in typical sizes
+};
+
+/// Less the numbers that are moved otherwise.
+LinearPart without(const LinearPart& part, const std::vector<FreedNumber>& live);
+
+/// A step along columns and what it leaves.
+struct LinearStep {
+  Eigen::VectorXd step;  ///< in typical sizes
+  double fitted = 0;     ///< chi-square with priors
+  double held_out = 0;
+};
+
+/// Products of [z, columns] summed over the fitted and the held-out blocks.
+LinearStep linear_step(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& held_out,
+                       const Eigen::VectorXd& precision, const Eigen::VectorXd& offset);
+
+struct Refit {
+  std::vector<FreedNumber> live, linear;  ///< at the solution
+  Machine machine;                        ///< with both
+  double fitted = 0, held_out = 0;        ///< chi-square with priors
+  Prediction prediction;                  ///< with the live numbers, the linear ones as they were
+  Column residual;                        ///< of that prediction
+  std::vector<Column> columns;            ///< of the live numbers at the solution
+  Eigen::VectorXd linear_step;            ///< of the linear numbers, in typical sizes
+  int simulations = 0;
+};
+
+Refit refit(const Evidence& evidence, const Machine& start, const std::vector<FreedNumber>& live,
+            const LinearPart& linear, int max_iterations = 12);
+
+/// Forward difference of a prediction with respect to a number, per typical size.
+Column column_of(const Evidence& evidence, const Machine& machine, const Prediction& base,
+                 const FreedNumber& number);
+
+}  // namespace vcnc

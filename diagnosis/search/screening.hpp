@@ -1,0 +1,79 @@
+// Which candidates could explain a residual: by their sensitivities through the closed loop.
+//
+// Every direction of every trial is simulated once from a base machine. Its whitened columns C and
+// those of the numbers that go along, N, are fitted to the residual of the fitted laps together;
+// what that leaves on the held-out laps against N alone is the gain of the candidate. A detection
+// limit is five standard deviations of a direction by the Cramer-Rao bound, N projected out.
+#pragma once
+
+#include <functional>
+#include <limits>
+#include <vector>
+
+#include "diagnosis/search/evidence.hpp"
+#include "diagnosis/search/refit.hpp"
+#include "diagnosis/search/trial.hpp"
+
+namespace vcnc {
+
+/// Products of some columns with others, remembered by the other column.
+class RememberedProducts {
+ public:
+  /// Computes what is not known yet of `columns` with `others`, and forgets all else.
+  void learn(const Evidence& evidence, const std::vector<const Column*>& others,
+             const std::vector<Column>& columns);
+  const RoleGrams& products() const { return products_; }  ///< of what was learnt last
+
+ private:
+  std::vector<Column> others_;  ///< of each row
+  RoleGrams products_;
+};
+
+/// A trial with the columns of its directions, per step.
+struct TrialColumns {
+  Trial trial;
+  std::vector<Column> columns;
+  RoleGrams own;  ///< products of the columns with each other
+  RememberedProducts ground;
+  double detection_limit = std::numeric_limits<double>::infinity();  ///< of its first number
+};
+
+struct Screened {
+  std::size_t trial = 0;  ///< index into the columns
+  double gain = 0;        ///< held-out chi-square
+  Eigen::VectorXd size;   ///< per direction, in steps
+};
+
+/// Simulates all trials from `base`. `keep_going` is asked now and then; where it says no, the rest
+/// stays without columns.
+std::vector<TrialColumns> simulate_trials(const Evidence& evidence, const Machine& base,
+                                          const Prediction& prediction,
+                                          const std::vector<Candidate>& candidates,
+                                          std::vector<Trial> trials,
+                                          const std::function<bool(double)>& keep_going);
+
+/// What the trials are held against: a residual with the numbers that go along, and the products of
+/// all of these.
+struct Ground {
+  Ground(const Evidence& evidence, const Column& residual, const LinearPart& linear);
+
+  std::vector<const Column*> columns;  ///< the residual, then those of the linear numbers
+  RoleGrams grams;
+  Eigen::VectorXd precision, offset;
+  double held_out = 0;  ///< chi-square with priors, the linear numbers fitted
+};
+
+/// Fills in the detection limits.
+void find_detection_limits(const Evidence& evidence, const Ground& ground,
+                           std::vector<TrialColumns>& trials);
+
+/// Gains of all trials on a residual, the best trial of every candidate, best first.
+std::vector<Screened> screen(const Evidence& evidence, const Ground& ground,
+                             const std::vector<Candidate>& candidates,
+                             std::vector<TrialColumns>& trials);
+
+/// Gain of two trials together that were screened on this ground.
+double pair_gain(const Evidence& evidence, const Ground& ground, const TrialColumns& a,
+                 const TrialColumns& b, Eigen::VectorXd& size);
+
+}  // namespace vcnc

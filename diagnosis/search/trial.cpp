@@ -1,0 +1,134 @@
+#include "diagnosis/search/trial.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "model/math.hpp"
+
+namespace vcnc {
+namespace {
+
+bool is_shape(const Candidate& c, std::size_t number) {
+  return std::find(c.shape.begin(), c.shape.end(), number) != c.shape.end();
+}
+
+/// Index of the phase of a candidate, or of none.
+std::size_t phase_of(const Candidate& c) {
+  for (std::size_t i = 0; i < c.numbers.size(); ++i)
+    if (is_phase(c.numbers[i])) return i;
+  return c.numbers.size();
+}
+
+bool contains(const std::string& text, const char* part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// An amplitude that stands beside a wave and has no phase.
+bool has_no_phase(const FreeNumber& n) { return contains(n.key, "_bow_"); }
+
+}  // namespace
+
+bool is_fixed(const FreeNumber& n) {
+  for (const char* part : {".reference_", ".rest_", ".expansion_", ".channel"})
+    if (contains(n.key, part)) return true;
+  return false;
+}
+
+bool is_phase(const FreeNumber& n) { return contains(n.key, ".phase_"); }
+
+std::vector<Trial> trials(const Machine& base, const std::vector<Candidate>& candidates,
+                          const TrialValues& trial_values) {
+  std::vector<Trial> all;
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    const Candidate& candidate = candidates[c];
+    Trial first{.candidate = c, .values = {}, .directions = {}};
+    bool present = false;  // the base machine has it already
+    for (std::size_t i = 0; i < candidate.numbers.size(); ++i) {
+      first.values.push_back(number_of(base, candidate.numbers[i].key));
+      present = present || (!is_shape(candidate, i) && first.values.back() != 0 &&
+                            !never_quite_absent(candidate.numbers[i].key));
+    }
+    const std::size_t phase = phase_of(candidate);
+    for (std::size_t i = 0; i < candidate.numbers.size(); ++i) {
+      if (is_shape(candidate, i) || is_fixed(candidate.numbers[i])) continue;
+      const FreeNumber& n = candidate.numbers[i];
+      double step = std::abs(n.typical);
+      if (present) step = std::min(step, std::max(0.05 * std::abs(first.values[i]), 1e-3 * step));
+      if (first.values[i] + step > n.max) step = -step;
+      first.directions.push_back({i, false, step});
+      if (phase < candidate.numbers.size() && !present && !has_no_phase(n))
+        first.directions.push_back({i, true, step});
+    }
+    std::vector<Trial> grid{first};
+    for (std::size_t i = 0; i < candidate.numbers.size() && !present; ++i) {
+      if (!is_shape(candidate, i) || is_fixed(candidate.numbers[i]) || i == phase) continue;
+      std::vector<Trial> wider;
+      for (const double value : trial_values(candidate, i)) {
+        const double allowed =
+            std::clamp(value, candidate.numbers[i].min, candidate.numbers[i].max);
+        for (Trial t : grid) {
+          t.values[i] = allowed;
+          wider.push_back(std::move(t));
+        }
+      }
+      if (!wider.empty()) grid = std::move(wider);
+    }
+    all.insert(all.end(), grid.begin(), grid.end());
+  }
+  return all;
+}
+
+Machine machine_of(const Machine& base, const Candidate& candidate, const Trial& trial,
+                   const Direction& direction) {
+  Machine machine = base;
+  const std::size_t phase = phase_of(candidate);
+  for (std::size_t i = 0; i < candidate.numbers.size(); ++i) {
+    double value = trial.values[i];
+    if (i == direction.number) value += direction.step;
+    if (i == phase && trial.directions.size() > 1 && direction.quadrature) value = 90;
+    move_number(machine, candidate.numbers[i].key, value);
+  }
+  return machine;
+}
+
+std::vector<FreedNumber> start_of(const Candidate& candidate, const Trial& trial,
+                                  const Eigen::VectorXd& size) {
+  std::vector<double> values = trial.values;
+  const std::size_t phase = phase_of(candidate);
+  const bool two = std::any_of(trial.directions.begin(), trial.directions.end(),
+                               [](const Direction& d) { return d.quadrature; });
+  double angle = 0, largest = 0;
+  std::vector<double> in(values.size(), 0.0), across(values.size(), 0.0);
+  for (std::size_t d = 0; d < trial.directions.size(); ++d) {
+    const Direction& direction = trial.directions[d];
+    const double part = size[static_cast<Eigen::Index>(d)] * direction.step;
+    (direction.quadrature ? across : in)[direction.number] = part;
+  }
+  if (two) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (is_shape(candidate, i) || has_no_phase(candidate.numbers[i])) continue;
+      const double strength = std::hypot(in[i], across[i]) / std::abs(candidate.numbers[i].typical);
+      if (strength <= largest) continue;
+      largest = strength;
+      angle = std::atan2(across[i], in[i]);
+    }
+    values[phase] = angle / kDegree;
+  }
+  std::vector<FreedNumber> numbers;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const FreeNumber& n = candidate.numbers[i];
+    if (is_fixed(n) || (is_phase(n) && !two)) continue;
+    const bool shape = is_shape(candidate, i);
+    if (!shape)
+      values[i] += has_no_phase(n) ? in[i] : in[i] * std::cos(angle) + across[i] * std::sin(angle);
+    FreedNumber freed{.number = n, .value = std::clamp(values[i], n.min, n.max), .centre = 0};
+    freed.number.typical = std::abs(n.typical) > 0 ? std::abs(n.typical) : 1;
+    if (is_phase(n)) freed.number.typical = 57.3;
+    if (shape && !is_phase(n)) freed.number.typical = std::max(std::abs(values[i]), 1e-6);
+    freed.shape = shape && !is_phase(n);
+    numbers.push_back(freed);
+  }
+  return numbers;
+}
+
+}  // namespace vcnc

@@ -1,0 +1,37 @@
+#include "diagnosis/commission.hpp"
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/diagnose.hpp"
+#include "diagnosis/replica/machine_replica.hpp"
+#include "diagnosis/search/freed_number.hpp"
+#include "healthy_run.hpp"
+#include "tests/sanitized.hpp"
+
+namespace vcnc {
+namespace {
+
+/// The whole machine, declared without friction and with a position gain that is too high.
+TEST(Commission, RecoversFrictionAndGainOfTheVirtualMachine) {
+  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
+  Effects effects;
+  effects.axis[kX].get<Coulomb>().level = 180;
+  effects.axis[kX].get<Viscous>().coefficient = 1500;
+  effects.axis[kX].get<KvError>().deviation = -0.06;
+  const RunOfMachine run = reversals_in_the_air(effects);
+  MachineReplica replica(run.record, run.declared, run.piece);
+  std::vector<Candidate> all = candidates(run.declared);
+  std::erase_if(all, [](const Candidate& c) { return c.place != "X"; });
+  const Commissioning c = commission({run.record, replica, run.declared, all});
+  EXPECT_NEAR(number_of(c.machine, "effects.X.coulomb.level_N"), 180, 0.02 * 180);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.viscous.coefficient_Ns_per_m"), 1500, 0.02 * 1500);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.kv_error.deviation_percent"), -6, 0.1);
+  ASSERT_FALSE(c.figures.empty());
+  for (const SignalFigure& f : c.figures)
+    if (f.channel.kind == SignalKind::position && f.channel.axis == kX) {
+      EXPECT_LT(f.after, 0.01 * f.before);
+    }
+}
+
+}  // namespace
+}  // namespace vcnc

@@ -1,0 +1,19 @@
+// A run of the whole machine for tests that know nothing of programs.
+#pragma once
+
+#include <optional>
+
+#include "diagnosis/records/record.hpp"
+
+namespace vcnc {
+
+struct RunOfMachine {
+  Record record;
+  Machine declared;
+  std::optional<PieceParams> piece;
+};
+
+/// X there and back in the air, on a machine with `effects` that declares none of them.
+RunOfMachine reversals_in_the_air(const Effects& effects);
+
+}  // namespace vcnc
