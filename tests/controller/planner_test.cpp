@@ -60,14 +60,7 @@ TEST(Planner, NoLineIsFasterThanTheOptimumAndNoneMuchSlower) {
     move.kind = Move::Kind::rapid;
     move.feed_mode = Move::Feed::none;
     const Trajectory run = plan({move}, machine);
-    // Time-optimal rest to rest with v 0.5, a 5, j 50 (a/j = 0.1 s).
-    double optimum;
-    if (length <= 2 * 50 * std::pow(0.1, 3))
-      optimum = 4 * std::cbrt(length / (2 * 50));
-    else if (length <= 0.5 * (0.5 / 5 + 0.1))
-      optimum = 0.1 + std::sqrt(0.01 + 4 * length / 5);
-    else
-      optimum = length / 0.5 + 0.5 / 5 + 0.1;
+    const double optimum = shortest_time(length);
     EXPECT_GE(run.duration(), optimum * 0.999) << length;
     EXPECT_LE(run.duration(), optimum * 1.35 + 0.004) << length;
     expect_within_limits(run, machine);
