@@ -4,7 +4,6 @@
 
 #include <iostream>
 #include <memory>
-#include <optional>
 
 #include "analysis/whole_file.hpp"
 #include "apps/node_options.hpp"
@@ -19,7 +18,6 @@
 #include "diagnosis/report/diagnosis_json.hpp"
 #include "diagnosis/report/diagnosis_page.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
-#include "diagnosis/search/differential.hpp"
 
 namespace vcnc {
 
@@ -77,22 +75,24 @@ std::vector<Candidate> candidates_without(const Machine& declared,
 /// run.
 Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
                            MachineReplica& replica, const Machine& declared, Record& seen) {
-  std::optional<Record> reference;
-  std::unique_ptr<MachineReplica> replica_of_reference;
-  std::optional<HealthyRun> healthy;
-  if (!options.reference.empty()) {
-    reference = load_record(options.reference, options.map);
-    replica_of_reference = replica_of(*reference, declared);
-    healthy.emplace(HealthyRun{*reference, *replica_of_reference});
-    seen = less_healthy(record, *reference, *replica_of_reference, declared).record;
-  }
   ProgressLine progress;
   const auto keep_going = [&](const DiagnosisProgress& p) {
     progress.show(fmt::format("{} {:.0f} %", p.doing, p.share * 100));
     return !stop_requested();
   };
-  Diagnosis d = diagnose({record, replica, declared, candidates_without(declared, options.without)},
-                         healthy, {}, keep_going);
+  const DiagnosisCase of{record, replica, declared, candidates_without(declared, options.without)};
+  Diagnosis d;
+  if (options.reference.empty()) {
+    d = diagnose(of, {}, keep_going);
+  } else {
+    progress.show("fitting the reference run");
+    const Record reference = load_record(options.reference, options.map);
+    const auto replica_of_reference = replica_of(reference, declared);
+    const DifferentialRecord difference =
+        less_healthy(record, reference, *replica_of_reference, declared);
+    seen = difference.record;
+    d = diagnose(of, difference, {}, keep_going);
+  }
   progress.show("predicting test runs");
   predict_tests(options, d.declared, d.found, d.figures);
   if (stop_requested()) d.warnings.push_back("stopped before the end; what was found so far");

@@ -27,6 +27,7 @@ NcUnitOptions begin_with(const Machine& machine, const NcRunOptions& options) {
   if (options.data) {
     nc.kept = load_nc_data(*options.data);
     nc.player.interpreter.data = options.resume ? nc.kept.begin : nc.kept.now;
+    if (options.resume || nc.player.from_line > 0) nc.player.interpreter.touches = nc.kept.touches;
   }
   nc.record = identity_of(machine, options.piece_toml, options.program, options.player);
   const std::vector<std::uint8_t> bytes = options.memory->load();

@@ -97,7 +97,7 @@ void PathWriter::begin(std::string_view type, int line) {
 
 void PathWriter::add(const Move& move) {
   const bool arc = move.kind == Move::Kind::arc;
-  begin(move.probe                       ? "probe"
+  begin(move.probe != Move::Probe::none  ? "probe"
         : arc                            ? "arc"
         : move.kind == Move::Kind::rapid ? "rapid"
                                          : "line",

@@ -24,13 +24,12 @@ long block_number(const std::string& text) {
   return number;
 }
 
-NcData kept_data(const std::string& memory, bool resumed) {
+KeptNcData kept_data(const std::string& memory) {
   std::error_code error;
   if (memory.empty() || !fs::exists(fs::path(memory) / "memory.txt", error)) return {};
   try {
     SlotFiles files(memory, "data");
-    const KeptNcData kept = load_nc_data(files);
-    return resumed ? kept.begin : kept.now;
+    return load_nc_data(files);
   } catch (const MemoryError& e) {
     throw InputError(e.what());
   }
@@ -75,7 +74,9 @@ PlayerOptions player_options(const ProgramChoice& options, const std::string& pr
                          : line_of_block(program, block_number(options.from_block));
   player.interpreter.block_delete = options.block_delete;
   player.interpreter.dialect = dialect_of(options.dialect);
-  player.interpreter.data = kept_data(options.memory, options.resumed);
+  KeptNcData kept = kept_data(options.memory);
+  player.interpreter.data = std::move(options.resumed ? kept.begin : kept.now);
+  if (options.resumed || player.from_line > 0) player.interpreter.touches = std::move(kept.touches);
   if (!options.tools.empty())
     player.interpreter.tools = read_tools(options.tools, options.tools_unit);
   return player;

@@ -105,9 +105,21 @@ constexpr std::array kTexts{
     AlarmText{AlarmCode::resumed, "An interrupted program goes on",
               "the mains came back with --on-power-return resume, or the run began with --resume",
               "none; this run or the one before holds the other part of the path"},
-    AlarmText{AlarmCode::program_refused, "The program cannot go on",
-              "block delete was switched while it ran, and the blocks that come now do not fit",
-              "look at the line named; check the program with and without --block-delete"},
+    AlarmText{
+        AlarmCode::program_refused, "The program cannot go on",
+        "what a probing move has found, or block delete switched while it ran, has made other "
+        "blocks of it than were checked, and they do not fit",
+        "look at the line named; check what was probed, and the program with and without "
+        "--block-delete"},
+    AlarmText{
+        AlarmCode::probe_no_contact, "A probing move has come to its end",
+        "G38.2: the probe has not touched on the way; G38.4: it has not let go",
+        "look at the place of the piece, the work offset and the end of the move; G38.3, G38.5 "
+        "and G31 go on"},
+    AlarmText{AlarmCode::probe_at_begin, "A probing move has nothing to look for",
+              "where it begins the probe touches already, or, for G38.4 and G38.5, is free; its "
+              "reading has had 0.1 s to settle",
+              "begin farther away; look whether the move before has run into the piece"},
 };
 
 }  // namespace

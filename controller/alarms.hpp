@@ -39,6 +39,8 @@ enum class AlarmCode {
   secured = 4004,
   resumed = 4005,
   program_refused = 5001,
+  probe_no_contact = 5002,
+  probe_at_begin = 5003,
 };
 
 struct AlarmText {

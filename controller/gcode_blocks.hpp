@@ -68,14 +68,16 @@ struct Move {
   double tolerance = 0;  ///< G64: of the controlled point [m]
   NcParams::Dynamics dynamics = NcParams::Dynamics::smooth;
   bool alone = false;  ///< begins and ends at rest (G28, G53, probing)
-  bool probe = false;  ///< G31, G38: would end where the probe touches
+  /// G31, G38.n: ends where the probe touches, or lets go; at its end only if that is allowed.
+  enum class Probe { none, touch, touch_or_end, leave, leave_or_end };
+  Probe probe = Probe::none;
   /// What the operator's overrides may do: `fixed` runs at 100 % (M49, probing), `locked` cannot be
   /// held before its end either (threads).
   enum class Panel { acts, fixed, locked };
   Panel panel = Panel::acts;
   /// Feed as the program gives it where that is not per minute: [m] per turn of the spindle (G95).
   double feed_per_turn = 0;
-  int line = 0;
+  int line = 0, column = 0;  ///< of the word that asks for it; 0: not from a program
 };
 
 struct Dwell {
@@ -113,6 +115,13 @@ struct ProgramStop {
 struct ProgramEnd {
   int line = 0;
 };
+
+/// A probing move that waits for the probe to let go.
+constexpr bool leaves(Move::Probe probe) { return probe >= Move::Probe::leave; }
+/// One that may not come to its end.
+constexpr bool must_find(Move::Probe probe) {
+  return probe == Move::Probe::touch || probe == Move::Probe::leave;
+}
 
 using Block = std::variant<Move, Dwell, SpindleWord, ProgramStop, ProgramEnd>;
 

@@ -48,13 +48,19 @@ std::string module_name(int node) {
   }
 }
 
+/// The unit reads the probe.
+PlayerOptions feeling(PlayerOptions options) {
+  options.feels = true;
+  return options;
+}
+
 }  // namespace
 
 NcUnit::NcUnit(const Machine& machine, const std::string& program, TelemetrySink& sink,
                const NcUnitOptions& options)
     : machine_(machine),
       protection_(machine.probe),
-      player_(program, machine, options.player),
+      player_(program, machine, feeling(options.player)),
       panel_(options.operations),
       shaping_(machine_chain<InterpolationPort>(machine.effects, kNoSeed)),
       compensation_(machine),
@@ -66,6 +72,7 @@ NcUnit::NcUnit(const Machine& machine, const std::string& program, TelemetrySink
       saved_(options.record) {
   protection_.restore(saved_.protection);
   if (!options_.resume) options_.kept.begin = options_.player.interpreter.data;
+  options_.kept.touches = player_.touches();
   if (options_.data) options_.data->save(encode_nc_data(options_.kept));
   if (options_.resume) seek();
   for (HeartbeatWatch& watch : heartbeats_) {
@@ -341,6 +348,27 @@ void NcUnit::operate(Tick k) {
   player_.attended(panel_.start_to_come());
 }
 
+/// Tells the program what the probe reads, with the axes as measured at the instant of the reading.
+void NcUnit::feel(Tick k) {
+  std::rotate(places_.begin(), places_.end() - 1, places_.end());
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    places_[0][i] = measured_[i].position - earlier_[1].correction[i];
+  const std::size_t age = static_cast<std::uint16_t>(low16(k) - probe_.tick);
+  if (!machine_.probe.in_spindle || !probe_heard_ || age >= places_.size() ||
+      state_ == NcState::alarm || state_ == NcState::done)
+    return;
+  player_.feel({Vec3(probe_.deflection.data()), places_[age]});
+}
+
+/// A probing move that has found nothing, or has nothing to look for.
+void NcUnit::watch_probing(Tick k) {
+  if (alarmed_ || player_.probe_fault() == ProbeFault::none) return;
+  const bool at_begin = player_.probe_fault() == ProbeFault::at_begin;
+  raise(k, at_begin ? AlarmCode::probe_at_begin : AlarmCode::probe_no_contact, "NC unit",
+        fmt::format("deflection {:.3f} mm", Vec3(probe_.deflection.data()).norm() * 1e3),
+        Stop::hold);
+}
+
 void NcUnit::watch_mains(Tick k) {
   if (mains_failing_ != mains_told_) {
     const bool playing = state_ == NcState::running || state_ == NcState::dwell ||
@@ -400,8 +428,9 @@ RunStage NcUnit::stage() const {
 void NcUnit::remember_data(Tick k, bool now) {
   if (options_.data == nullptr || (!now && k - data_saved_at_ < kDataCycles)) return;
   data_saved_at_ = k;
-  if (player_.data() == options_.kept.now) return;
+  if (player_.data() == options_.kept.now && player_.touches() == options_.kept.touches) return;
   options_.kept.now = player_.data();
+  options_.kept.touches = player_.touches();
   options_.data->save(encode_nc_data(options_.kept));
 }
 
@@ -432,6 +461,7 @@ void NcUnit::remember(Tick k) {
 void NcUnit::advance(Tick k) {
   earlier_[1] = earlier_[0];
   earlier_[0] = planned_;
+  feel(k);
   if (state_ == NcState::starting) {
     const bool enabled = std::all_of(
         measured_next_.begin(), measured_next_.end(),
@@ -467,6 +497,7 @@ void NcUnit::advance(Tick k) {
       reason_ = "program end";
     }
   }
+  watch_probing(k);
   if (state_ == NcState::alarm) {
     if (stop_ == Stop::quick) {  // the drives brake on their own ramps
       planned_.step.velocity.fill(0);
@@ -488,6 +519,14 @@ void NcUnit::shape(Tick k) {
   planned_.step.velocity = signal.velocity;
 }
 
+/// The probe's deflection; 0 where the protection has not spoken and there is no belief in contact.
+Vec3 NcUnit::touching() const {
+  const Vec3 deflection(probe_.deflection.data());
+  const bool spoken =
+      protection_.latched() || overtravel_.state >= OvertravelState::State::soft_stop;
+  return spoken || deflection.norm() >= machine_.probe.min_deflection ? deflection : Vec3::Zero();
+}
+
 /// Holds on the path, then takes the probe off what it touches.
 void NcUnit::stop_softly(Tick k) {
   if (stop_ == Stop::hold) {
@@ -498,7 +537,7 @@ void NcUnit::stop_softly(Tick k) {
     if (retracting_since_ == 0) retracting_since_ = k;
     if (k - retracting_since_ < kSettleCycles) return;  // the deflection of the axes at rest
     stop_ = Stop::retract;
-    retract_.emplace(machine_, planned_.step.position, Vec3(probe_.deflection.data()));
+    retract_.emplace(machine_, planned_.step.position, touching());
     retracting_since_ = k;
   }
   const double t = seconds(k - retracting_since_);

@@ -17,6 +17,9 @@
 // retracts the probe (retract.hpp) with the drives in operation; a quick stop leaves braking to the
 // drives. Either way the run ends in an alarm, with the spindle locked.
 //
+// A probing move of the program ends where the probe's reading says so (Player::feel): each reading
+// goes with the measured positions of the instant it belongs to, be it one or two cycles old.
+//
 // A power-fail signal while the program runs is ridden out: see controller/outage.hpp. Each step is
 // kept in the unit's memory (controller/nc_record.hpp), so that a program goes on after the supply
 // was exhausted, too. What the own protection has latched is kept there as well.
@@ -112,12 +115,15 @@ class NcUnit : public Master {
   void ride_out(Tick k);
   void seek();
   void operate(Tick k);
+  void feel(Tick k);
+  void watch_probing(Tick k);
   void tell(Tick k, AlarmCode code, const std::string& detail);
   void remember(Tick k);
   void remember_data(Tick k, bool now);
   void advance(Tick k);
   void shape(Tick k);
   void stop_softly(Tick k);
+  Vec3 touching() const;
   void command(Tick k, Frames& out);
   void sample(Tick k);
   /// Stops the machine, at least as hard as it is stopping already, and tells why.
@@ -153,6 +159,7 @@ class NcUnit : public Master {
 
   std::array<DriveStatus, kAxisCount + 1> measured_next_{};  ///< of t_k+1: axes, spindle
   std::array<DriveStatus, kAxisCount + 1> measured_{};       ///< of t_k
+  std::array<AxisVector, 3> places_{};  ///< as the program has them: of t_k, t_k-1, t_k-2
   ProbeSample probe_;
   bool probe_heard_ = false;  ///< a sample came in this cycle
   OvertravelState overtravel_;

@@ -12,6 +12,11 @@ constexpr double kLargestArcStep = 0.5;   ///< angle integrated at once [rad]
 constexpr double kKnotStep = 4;           ///< distance of the knots of h(s), in h
 /// How far a width has an influence: the hat itself and the slope down from the widest.
 constexpr double kReach = Path::kLargestWidth * (2 + 1 / Path::kWidthSlope);
+constexpr double kCornerDetail = 4;  ///< of a corner's cut
+constexpr double kRoom = 0.45;       ///< of a line, for the curve of a corner
+constexpr double kWorth = 0.45;      ///< least share of the tolerance for which a corner swings out
+constexpr double kSwingingJump = 0.1, kPlainJump = 0.5;  ///< least jump of the tangent
+constexpr double kRunIn = 0.25;                          ///< of an arc, at most, next to a line
 constexpr double kSmallestSine = 0.05;  ///< near the pole C does not turn the tool axis
 
 /// Gauss-Legendre points on [-1, 1].
@@ -108,6 +113,7 @@ void Path::forget(double s) {
   const double from = std::min(s, settled_) - kReach;
   const auto before = [from](const Bound& b) { return b.s < from; };
   segments_.erase(segments_.begin(), segments_.begin() + static_cast<std::ptrdiff_t>(index(from)));
+  std::erase_if(corners_, [from](const Corner& corner) { return corner.s < from; });
   // One of each stays before the place.
   for (std::vector<Bound>* list : {&bounds_, &knots_}) {
     const auto keep = std::partition_point(list->begin(), list->end(), before);
@@ -128,8 +134,10 @@ void Path::append(std::vector<Move> moves) {
     segments_.push_back(std::move(segment));
   }
   if (segments_.empty()) return;
+  const double settled = settled_;
   bound_width();
   build_width();
+  find_corners(settled);
 }
 
 std::size_t Path::index(double s) const {
@@ -144,7 +152,19 @@ PathPoint Path::programmed(double s) const {
 
 PathPoint Path::eval(double s) const {
   s = std::clamp(s, 0.0, length_);
+  if (const Corner* corner = corner_at(s)) {
+    PathPoint point = programmed(s);
+    const PathCorner::Share share = corner->curve.at(s - corner->s);
+    point.x += share.value * corner->jump;
+    point.dx += share.slope * corner->jump;
+    return point;
+  }
   return smooth(s, width(s));
+}
+
+double Path::detail(double s) const {
+  const Corner* corner = corner_at(s);
+  return corner ? kCornerDetail * corner->curve.cut() : width(s).h;
 }
 
 // --------------------------------------------------------------------------------- the average
@@ -288,11 +308,21 @@ void Path::bound_width() {
     }
     // Arcs have their own cap, everywhere: samples no further apart than the envelope can climb.
     const double curvature = std::abs(segment.move.arc.sweep) / segment.length;
-    const double tolerance = std::min(kArcTolerance, tolerance_at(segment.s0));
-    const double cap = std::min(kLargestWidth, std::sqrt(12 * tolerance / curvature));
-    const auto samples = static_cast<int>(std::ceil(segment.length / cap));
+    const auto cap_for = [&](double tolerance) {
+      return std::min(kLargestWidth, std::sqrt(12 * tolerance / curvature));
+    };
+    const double programmed = tolerance_at(segment.s0);
+    const double narrow = cap_for(std::min(kArcTolerance, programmed)), wide = cap_for(programmed);
+    const double run_in =
+        fast() ? std::min(kRunIn * segment.length, (wide - narrow) / kWidthSlope) : 0;
+    const auto line = [&](std::size_t i) {
+      return i < segments_.size() && segments_[i].move.kind != Move::Kind::arc;
+    };
+    const double begin = k > 0 && line(k - 1) ? run_in : 0, end = line(k + 1) ? run_in : 0;
+    const auto samples = static_cast<int>(std::ceil(segment.length / narrow));
     for (int i = 0; i < samples; ++i) {
-      const double s = segment.s0 + segment.length * (i + 0.5) / samples;
+      const double way = segment.length * (i + 0.5) / samples, s = segment.s0 + way;
+      const double cap = way < begin || segment.length - way < end ? wide : narrow;
       bounds_.push_back({s, last = largest_width(s, cap, cap)});
     }
   }
@@ -356,6 +386,49 @@ Path::Width Path::width(double s) const {
   const double span = right.s - left.s, rise = right.h - left.h;
   const Step step = smooth_step(std::clamp((s - left.s) / span, 0.0, 1.0));
   return {left.h + rise * step.value, rise * step.slope / span};
+}
+
+// ------------------------------------------------------------------------------------- corners
+
+/// Outside of a corner's curve the average sees lines, so one continues the other.
+void Path::find_corners(double from) {
+  if (!fast()) return;
+  std::erase_if(corners_, [from](const Corner& corner) { return corner.s > from; });
+  for (std::size_t k = std::max<std::size_t>(index(from), 1); k < segments_.size(); ++k) {
+    if (segments_[k].s0 <= from) continue;
+    if (const auto corner = corner_between(segments_[k - 1], segments_[k]))
+      corners_.push_back(*corner);
+  }
+}
+
+std::optional<Path::Corner> Path::corner_between(const PathSegment& before,
+                                                 const PathSegment& behind) const {
+  const auto straight = [](const PathSegment& s) { return s.move.kind != Move::Kind::arc; };
+  if (!straight(before) || !straight(behind)) return std::nullopt;
+  const Coordinates t1 = (before.move.end - before.move.start) / before.length;
+  const Coordinates t2 = (behind.move.end - behind.move.start) / behind.length;
+  const Coordinates jump = t2 - t1;
+  const double tip = jump.head<3>().norm(), turn = jump.tail<2>().norm();
+  if (tip < kSwingingJump || turn > 0) return std::nullopt;
+  const double wanted = tolerance_at(behind.s0) / tip, h = width(behind.s0).h;
+  const double room = kRoom * std::min(before.length, behind.length);
+  for (const auto shape : {PathCorner::Shape::swinging, PathCorner::Shape::plain}) {
+    const double cut = std::min(wanted, room / PathCorner::reach_per_cut(shape));
+    const PathCorner curve(shape, cut);
+    const bool worth =
+        shape == PathCorner::Shape::swinging ? cut >= kWorth * wanted : tip >= kPlainJump;
+    if (worth && curve.reach() * (1 - kWidthSlope) > h) return Corner{behind.s0, curve, jump};
+  }
+  return std::nullopt;
+}
+
+const Path::Corner* Path::corner_at(double s) const {
+  const auto next = std::lower_bound(corners_.begin(), corners_.end(), s,
+                                     [](const Corner& corner, double at) { return corner.s < at; });
+  if (next != corners_.end() && next->s - s < next->curve.reach()) return &*next;
+  if (next != corners_.begin() && s - (next - 1)->s < (next - 1)->curve.reach())
+    return &*(next - 1);
+  return nullptr;
 }
 
 }  // namespace vcnc

@@ -12,14 +12,21 @@
 //   curve      |x - r| = kappa h^2 / 12
 // so h(s) follows from the tolerance; where it has to change it does so slowly (slope below
 // kWidthSlope between the constraints), by C2 steps. Arcs are kept within kArcTolerance whatever
-// the tolerance is, so that a circle keeps its radius. Source: the two-fold average is the B-spline
-// filter of order 2 (Biagiotti, Melchiorri, Trajectory Planning for Automatic Machines and Robots,
-// ch. 4); the variable width and its bound are our own.
+// the tolerance is, so that a circle keeps its radius.
+//
+// Under the fast dynamics corners of two lines get a curve that a motion with limited jerk takes in
+// less time (path_corner.hpp), where they have room for it, and an arc next to a line, where its
+// curvature has to begin, is held to the tolerance of the program; over a quarter of it at most the
+// width comes down to the one of arcs.
+// Source: the two-fold average is the B-spline filter of order 2 (Biagiotti, Melchiorri, Trajectory
+// Planning for Automatic Machines and Robots, ch. 4); the variable width and its bound are our own.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "controller/gcode_blocks.hpp"
+#include "controller/path_corner.hpp"
 
 namespace vcnc {
 
@@ -60,6 +67,8 @@ class Path {
   PathPoint eval(double s) const;        ///< the smooth curve; s is clamped to [0, length]
   PathPoint programmed(double s) const;  ///< r(s), for checks; right-hand derivative
   double half_width(double s) const { return width(s).h; }
+  /// Length over which the curve may bend otherwise.
+  double detail(double s) const;
   const PathSegment& segment(double s) const { return segments_[index(s)]; }
   const std::vector<PathSegment>& segments() const { return segments_; }
   const MotionFrame& frame() const { return segments_.front().move.frame; }
@@ -71,7 +80,14 @@ class Path {
   struct Bound {
     double s, h;
   };
+  /// A corner of two lines that has a curve of its own.
+  struct Corner {
+    double s;
+    PathCorner curve;
+    Coordinates jump;  ///< of the tangent
+  };
   struct Kernel;  ///< accumulates the average
+  bool fast() const { return segments_.front().move.dynamics == NcParams::Dynamics::fast; }
   std::size_t index(double s) const;
   Width width(double s) const;
   PathPoint smooth(double s, Width w) const;
@@ -80,12 +96,16 @@ class Path {
   void append(std::vector<Move> moves);
   void bound_width();
   void build_width();
+  void find_corners(double from);
+  const Corner* corner_at(double s) const;
+  std::optional<Corner> corner_between(const PathSegment& before, const PathSegment& behind) const;
   double tolerance_at(double s) const;
 
   std::vector<PathSegment> segments_;
   double length_ = 0, angle_tolerance_;
   std::vector<Bound> bounds_;  ///< largest widths by tolerance
   std::vector<Bound> knots_;   ///< h(s) runs through these
+  std::vector<Corner> corners_;
   double settled_ = 0;
   bool open_;
 };

@@ -97,7 +97,7 @@ std::vector<LimitNode> limit_nodes(const Path& path, const FrameMap& map,
     node.v_max = speed_limit(path, s, point.dx, axes, probing);
     if (s >= end) break;
     const double step =
-        std::min({path.half_width(s) / kStepsPerWidth, kLargestStep, length / kFewestSteps});
+        std::min({path.detail(s) / kStepsPerWidth, kLargestStep, length / kFewestSteps});
     s = end - s < 1.5 * step ? end : s + step;
   }
 

@@ -96,9 +96,15 @@ void check_travel(const Coordinates& q, const Machine& machine, const std::strin
   }
 }
 
+/// "FILE:LINE:COLUMN" of a move.
+std::string place_of(const Move& move, const std::string& path_name) {
+  return move.column > 0 ? fmt::format("{}:{}:{}", path_name, move.line, move.column)
+                         : fmt::format("{}:{}", path_name, move.line);
+}
+
 /// Checks the travel along a move: its end, and points between where the axes' path is curved.
 void check_move(const Move& move, const Machine& machine, const std::string& path_name) {
-  const std::string where = path_name + ":" + std::to_string(move.line);
+  const std::string where = place_of(move, path_name);
   const FrameMap map(machine.kinematics, move.frame);
   const Coordinates way = map.to_axes(move.end) - map.to_axes(move.start);
   for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -171,9 +177,9 @@ void check_probing_feed(const Move& move, const Machine& machine, const ProbingL
   const char* side = bound.by == ProbingBound::By::axial ? "axial" : "lateral";
   if (bound.factor <= 0)
     throw ProgramError(fmt::format(
-        "{}:{}: in a crash the probe could not be stopped between its range and its {} limit at "
+        "{}: in a crash the probe could not be stopped between its range and its {} limit at "
         "any speed: see probe.range_mm, probe.overtravel_{}_mm, probe.overtravel_force_{}_N",
-        path_name, move.line, side, side, side));
+        place_of(move, path_name), side, side, side));
   if (move.feed_mode == Move::Feed::none || bound.factor >= 1 - kFeedRounding) return;
   const double feed = move.feed_mode == Move::Feed::tip ? move.feed * 60 / (inches ? 25.4e-3 : 1e-3)
                       : move.feed_mode == Move::Feed::rotary ? move.feed * 60 / kDegree
@@ -187,8 +193,8 @@ void check_probing_feed(const Move& move, const Machine& machine, const ProbingL
                                 ? fmt::format(" ({} moves the ball at a lever of {:.1f} mm)",
                                               kAxisNames[bound.axis], bound.lever * 1e3)
                                 : "";
-  throw ProgramError(fmt::format("{}:{}: {} is too fast for the probe: {}{}; allowed {} is {} {}",
-                                 path_name, move.line, feed_word(feed), why, lever,
+  throw ProgramError(fmt::format("{}: {} is too fast for the probe: {}{}; allowed {} is {} {}",
+                                 place_of(move, path_name), feed_word(feed), why, lever,
                                  move.feed_mode == Move::Feed::tip ? "in this direction" : "here",
                                  feed_word(feed * bound.factor),
                                  move.feed_mode == Move::Feed::tip ? inches ? "inch/min" : "mm/min"
@@ -315,13 +321,28 @@ std::deque<Block> approach_to(const BlockStart& start, const Machine& machine) {
 
 }  // namespace
 
+/// A probing move that is being played.
+struct Player::Search {
+  Move::Probe probe = Move::Probe::none;
+  ProbeTouch touch;              ///< what it comes to
+  Vec3 way = Vec3::Zero();       ///< of X, Y, Z, of length 1; 0: not a straight one
+  std::optional<double> stop{};  ///< on the path: where it ends before its end [s]
+  bool replayed = false;         ///< all of this is known from before
+  bool found = false;
+  double end = 0;  ///< of its path [s]
+  Tick late = 0;   ///< cycles waited at its end
+};
+
 struct Player::State {
   State(const std::string& file, const Machine& the_machine, const PlayerOptions& options)
       : machine(the_machine),
         file_name(file),
         program(file, the_machine, options.interpreter),
         rates(the_machine),
-        probing(probing_limit(the_machine)) {
+        probing(probing_limit(the_machine)),
+        feels(options.feels),
+        trigger(the_machine.probe),
+        touches(options.interpreter.touches) {
     panel.block_delete = options.interpreter.block_delete;
     data = options.interpreter.data;
     for (std::size_t i = 0; i < kAxisCount; ++i) step.position[i] = machine.axes[i].limits.start;
@@ -336,7 +357,9 @@ struct Player::State {
       approach = approach_to(*begins_at, machine);
       for (const Block& block : approach)
         if (const Move* move = std::get_if<Move>(&block)) check_move(*move, machine, file);
+      done_touches = begins_at->probings;
     }
+    program.forget_touches();
   }
 
   const Machine machine;
@@ -379,12 +402,25 @@ struct Player::State {
   NcData data;
   Tick data_at = 0;  ///< when it was looked at
 
+  const bool feels;
+  TouchTrigger trigger;
+  std::vector<ProbeTouch> touches;
+  std::size_t done_touches = 0;  ///< of them
+  bool seeking = false;          ///< what is known is done again
+  std::optional<Search> search;
+  Tick settling = 0;  ///< cycles waited before a probing move
+  ProbeFault fault = ProbeFault::none;
+
   /// Time on the path of the run now [s].
   double path_time() const {
     if (!run) return 0;
+    if (search && search->stop && !whole && !changing()) return *search->stop;
     const double tau = whole ? seconds(cycle) : law.path_time(seconds(law_cycle));
-    return std::min(tau, run->duration());
+    return std::min(tau, end_of_run());
   }
+
+  /// Where the run ends on its path [s].
+  double end_of_run() const { return search && search->stop ? *search->stop : run->duration(); }
 
   /// d tau / dt now.
   double rate() const { return whole ? 1 : law.rate(seconds(law_cycle)); }
@@ -404,6 +440,10 @@ struct Player::State {
 
   /// Begins to brake where the run stands now.
   void begin_hold() {
+    if (search && search->stop && !search->replayed) {  // it brakes already
+      holding = true;
+      return;
+    }
     const double tau = path_time(), now = rate();
     law = {tau, now, 0, run ? time_for(now, tau) : kCycle};
     law_cycle = 0;
@@ -417,7 +457,7 @@ struct Player::State {
 
   /// Time on the path at which a hold comes to rest [s].
   double rest_time() const {
-    return run ? std::min(law.start + 0.5 * law.from * law.time, run->duration()) : 0;
+    return run ? std::min(law.start + 0.5 * law.from * law.time, end_of_run()) : 0;
   }
 
   /// Whole cycles of the run or dwell that have passed at a time on its path.
@@ -429,6 +469,10 @@ struct Player::State {
     holding = false;
     if (!run) {  // a dwell simply goes on
       whole = true;
+      return;
+    }
+    if (search && search->stop) {
+      end_run();
       return;
     }
     const double tau = path_time();
@@ -492,12 +536,13 @@ struct Player::State {
       }
     }
     move_on_path();
-    if (run->complete() && path_time() >= run->duration()) end_run();
+    const bool stopped = search && search->stop && !changing();
+    if (stopped || (run->complete() && path_time() >= run->duration())) end_run();
   }
 
   /// The run at whole cycles, as programmed.
   void play() {
-    const MotionSample sample = run->at(std::min(seconds(cycle), run->duration()));
+    const MotionSample sample = run->at(std::min(seconds(cycle), end_of_run()));
     step.position = sample.q;
     step.velocity = sample.dq;
     step.tip = sample.tip;
@@ -508,6 +553,7 @@ struct Player::State {
   }
 
   void end_run() {
+    if (search) search->end = end_of_run();
     cycle = cycles;
     played = begun + cycle;
     run.reset();
@@ -515,6 +561,75 @@ struct Player::State {
     rising = false;
     planned.reset();
     block_done = true;
+    if (search && (search->found || search->replayed)) end_search();
+  }
+
+  // ---------------------------------------------------------------------------------- probing
+
+  /// What a probing move looks for is there.
+  bool is_there(Move::Probe probe) const { return trigger.tripped() != leaves(probe); }
+
+  void begin_search(const Move& move) {
+    search.emplace();
+    search->probe = move.probe;
+    search->touch = program.probing();
+    const FrameMap map(machine.kinematics, move.frame);
+    const Coordinates way = map.to_axes(move.end) - map.to_axes(move.start);
+    if (way.tail<2>().isZero(0)) search->way = way.head<3>().normalized();
+    search->replayed = seeking && done_touches < touches.size();
+    if (search->replayed) {
+      search->touch = touches[done_touches];
+      search->stop = search->touch.at;
+    } else {
+      touches.resize(done_touches);
+    }
+  }
+
+  /// The trigger has changed as the probing move waits for.
+  void found(const ProbeReading& reading) {
+    search->found = true;
+    search->touch.touched = true;
+    search->touch.found = touch_point(machine, reading, search->way);
+    if (run) search->stop = brake_here();
+    search->touch.at = run ? *search->stop : search->end;
+    search->touch.rest = run ? run->at(*search->stop).q : step.position;
+    touches.push_back(search->touch);
+  }
+
+  /// Brakes within the limits, if the axes do not come to rest already; where they will stand [s].
+  double brake_here() {
+    const double tau = path_time(), now = rate();
+    rising = false;
+    planned.reset();
+    if (now == 0) {
+      whole = false;
+      law = {tau, 0, 0, 0};
+    } else if (whole || law.to != 0) {
+      const auto change = rates.change(*run, tau, now, 0, 1);
+      begin_change(change ? *change : rates.slowest(*run, tau, now, 0));
+    }
+    return std::min(law.start + law.way(), run->duration());
+  }
+
+  /// At the end of a probing move: the reading is younger than the set-point.
+  void await() {
+    if (seconds(++search->late) < kSettleSeconds) return;
+    if (must_find(search->probe)) {
+      fault = ProbeFault::not_found;
+      return;
+    }
+    search->touch.touched = false;
+    search->touch.at = search->end;
+    search->touch.found = search->touch.rest = step.position;
+    touches.push_back(search->touch);
+    end_search();
+  }
+
+  void end_search() {
+    program.probed(search->touch);
+    done_touches = search->replayed ? done_touches + 1 : touches.size();
+    search.reset();
+    unchecked = true;
   }
 
   // ----------------------------------------------------------------------------- the operator
@@ -546,6 +661,7 @@ struct Player::State {
 
   /// Before a cycle of motion: does the rate have to change from here on?
   void steer() {
+    if (search && search->stop) return;
     constexpr Tick kBetweenTries = 10, kPatience = 500;
     const bool at_ease = panel.feed == 1 && panel.rapid == 1 && !panel.single_block && !feed_held;
     if (changing() || (at_ease && whole && !planned)) return;
@@ -704,7 +820,7 @@ struct Player::State {
   MoveBatch gather() {
     MoveBatch batch;
     double way = 0, time = 0, nodes = 0;
-    while (!batch.open) {
+    while (!batch.open && !(last && last->probe != Move::Probe::none)) {
       if (!pending) pending = read();
       Move* next = std::get_if<Move>(&*pending);
       if (!next || (last && !continues(*last, *next))) break;
@@ -726,10 +842,14 @@ struct Player::State {
 
   void begin_run(Move first) {
     last.reset();
+    if (feels && first.probe != Move::Probe::none) begin_search(first);
     pending = std::move(first);
     MoveBatch batch = gather();
     Path path(std::move(batch.moves), machine.nc.angle_tolerance, batch.open);
-    if (path.segments().empty()) return;
+    if (path.segments().empty()) {
+      if (search && search->replayed) end_search();
+      return;
+    }
     run.emplace(std::move(path), machine, [this] { return gather(); });
     begin_wait(0);
     look_ahead();
@@ -740,7 +860,8 @@ struct Player::State {
   void look_ahead() {
     const double tau = path_time();
     run->plan(tau, tau + ahead);
-    cycles = run->complete() ? cycles_of(run->duration()) : std::numeric_limits<Tick>::max();
+    const bool complete = run->complete() || (search && search->stop);
+    cycles = complete ? cycles_of(end_of_run()) : std::numeric_limits<Tick>::max();
   }
 
   /// The moves of a run with what the planner allows itself.
@@ -795,6 +916,14 @@ struct Player::State {
                (word.mode == Mode::orient ? kOrientSeconds : 0));
   }
 
+  /// Before a probing move: its reading is that of axes at rest, or is waited for.
+  bool settles(const Move& move) {
+    const bool must = feels && !seeking && move.probe != Move::Probe::none && is_there(move.probe);
+    settling = must ? settling + 1 : 0;
+    if (seconds(settling) > kSettleSeconds) fault = ProbeFault::at_begin;
+    return must;
+  }
+
   /// Starts blocks until one takes time or the program ends.
   void begin_next() {
     constexpr Tick kDataEvery = 1000;
@@ -802,10 +931,14 @@ struct Player::State {
       data = program.data();
       data_at = played;
     }
-    while (cycle >= cycles && !step.done && wait == Wait::none) {
+    while (cycle >= cycles && !step.done && wait == Wait::none && !search) {
       Block block = take();
       if (Move* move = std::get_if<Move>(&block)) {
         step.line = move->line;
+        if (settles(*move)) {
+          pending = std::move(block);
+          return;
+        }
         begin_run(std::move(*move));
       } else if (const Dwell* dwell = std::get_if<Dwell>(&block)) {
         step.line = dwell->line;
@@ -856,6 +989,20 @@ Player::Player(const std::string& path, const Machine& machine, const PlayerOpti
 }
 
 Player::~Player() = default;
+
+void Player::feel(const ProbeReading& reading) {
+  State& state = *state_;
+  state.trigger.step(reading.deflection);
+  const bool searches = state.search && !state.search->found && !state.search->replayed &&
+                        state.fault == ProbeFault::none && !state.held();
+  if (!searches || !state.is_there(state.search->probe)) return;
+  state.found(reading);
+  if (!state.run) state.end_search();
+}
+
+ProbeFault Player::probe_fault() const { return state_->fault; }
+
+const std::vector<ProbeTouch>& Player::touches() const { return state_->touches; }
 
 void Player::hold() {
   if (!state_->holding) state_->begin_hold();
@@ -915,7 +1062,9 @@ AxisVector Player::rest() const {
 
 void Player::seek(const ProgramTime& time) {
   State& state = *state_;
-  while (state.played < time.cycles && !state.step.done) step();
+  state.seeking = true;
+  while (state.played < time.cycles && !state.step.done && !(state.search && !state.run)) step();
+  state.seeking = false;
   if (state.played != time.cycles) throw std::out_of_range("the program ends before that moment");
   state.holding = true;
   state.whole = false;
@@ -940,14 +1089,27 @@ PlayerStep Player::step() {
   }
   if (!state.run && state.cycle >= state.cycles && state.panel.single_block && state.block_done)
     state.wait = State::Wait::block;
+  if (state.fault != ProbeFault::none) {
+    step.dwell = true;
+    return step;
+  }
   if (state.waiting()) {
     state.stand();
+    step.dwell = true;
+    return step;
+  }
+  if (state.search && !state.run) {
+    state.await();
     step.dwell = true;
     return step;
   }
   if (state.cycle >= state.cycles) state.begin_next();
   step.dwell = false;
   if (step.done) return step;
+  if (state.settling > 0 || (state.search && !state.run)) {
+    step.dwell = true;
+    return step;
+  }
   if (state.wait == State::Wait::stop) {  // M0, M1
     state.stand();
     step.dwell = true;

@@ -4,11 +4,13 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "bus/tick.hpp"
 #include "controller/gcode/interpreter.hpp"
 #include "controller/operation.hpp"
 #include "controller/program_error.hpp"
+#include "controller/touch_trigger.hpp"
 #include "model/axes.hpp"
 #include "model/input_error.hpp"
 #include "model/machine.hpp"
@@ -38,7 +40,15 @@ struct ProgramTime {
 
 struct PlayerOptions {
   InterpreterOptions interpreter{};
-  int from_line = 0;  ///< the program begins there (controller/gcode/block_search.hpp); 0: not
+  int from_line = 0;   ///< the program begins there (controller/gcode/block_search.hpp); 0: not
+  bool feels = false;  ///< feel() is told what the probe reads
+};
+
+/// Why a program cannot go on behind a probing move.
+enum class ProbeFault {
+  none,
+  not_found,  ///< its end was reached, which it must not be
+  at_begin    ///< what it looks for is there before it begins
 };
 
 class Player {
@@ -55,8 +65,20 @@ class Player {
   static constexpr double kStandOff = 20e-3, kApproachSpeed = 10e-3;
 
   /// Next cycle. `start` positions are those of the machine file. Throws ProgramError only where
-  /// the switch for block delete has made another program of the one that was checked.
+  /// the switch for block delete, or what was probed, has made another program of the one that was
+  /// checked.
   PlayerStep step();
+
+  /// What the probe reads, before the step of each cycle in which it was heard. A probing move
+  /// (G31, G38.n) brakes within the limits of the axes as soon as its trigger (touch_trigger.hpp)
+  /// says so, and the program goes on reading from where they stand; before one, and at the end of
+  /// one that has found nothing, up to kSettleSeconds are waited for the reading. Who never feels
+  /// has the contact at the end of each.
+  void feel(const ProbeReading& reading);
+  static constexpr double kSettleSeconds = 0.1;
+  ProbeFault probe_fault() const;  ///< the program stands there
+  /// What the probing moves have come to, in the order of the program.
+  const std::vector<ProbeTouch>& touches() const;
 
   /// Feed hold: from the next cycle on the axes come to rest on the path, along
   ///   d tau / dt = r (1 - 3 s^2 + 2 s^3),  s = t / T_h
@@ -101,6 +123,7 @@ class Player {
   void seek(const ProgramTime& time);
 
  private:
+  struct Search;
   struct State;
   std::unique_ptr<State> state_;
 };

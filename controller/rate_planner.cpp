@@ -13,7 +13,6 @@ constexpr double kRounding = 1e-6;  ///< of a cycle: a change that is aligned st
 constexpr double kHorizon = 2;      ///< so far ahead on the path is looked [s]
 constexpr double kSteepest = 1.5;   ///< of a change: largest r' T / |r1 - r0|
 constexpr double kCurved = 6;       ///< largest r'' T^2 / |r1 - r0|
-constexpr double kShare = 0.5;      ///< of the limits, for the first candidate
 constexpr double kGrowth = 1.3;
 constexpr int kCandidates = 10;
 
@@ -71,12 +70,13 @@ const MotionLimits& RatePlanner::limits(const Trajectory& run) const {
 }
 
 /// In which the change could be made if the path were straight there.
-double RatePlanner::shortest_time(const Trajectory& run, double at, double difference) const {
+double RatePlanner::shortest_time(const Trajectory& run, double at, double difference,
+                                  double share) const {
   const MotionSample now = run.at(at);
   const Coordinates v = Eigen::Map<const Coordinates>(now.dq.data()) * std::abs(difference);
   const MotionLimits& most = limits(run);
-  return std::max({kShortest, kSteepest * largest(v, most.acceleration) / kShare,
-                   std::sqrt(kCurved * largest(v, most.jerk) / kShare)});
+  return std::max({kShortest, kSteepest * largest(v, most.acceleration) / share,
+                   std::sqrt(kCurved * largest(v, most.jerk) / share)});
 }
 
 bool RatePlanner::keeps_limits(const Trajectory& run, const RateChange& change) const {
@@ -102,8 +102,8 @@ bool RatePlanner::keeps_limits(const Trajectory& run, const RateChange& change) 
 }
 
 std::optional<RateChange> RatePlanner::change(const Trajectory& run, double start, double from,
-                                              double to) const {
-  double time = shortest_time(run, start, to - from);
+                                              double to, double share) const {
+  double time = shortest_time(run, start, to - from, share);
   for (int i = 0; i < kCandidates; ++i, time *= kGrowth) {
     const RateChange candidate = aligned({start, from, to, time}).change;
     if (keeps_limits(run, candidate)) return candidate;

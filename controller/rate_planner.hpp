@@ -24,13 +24,15 @@ namespace vcnc {
 
 class RatePlanner {
  public:
-  static constexpr double kAllowedShare = 1.001, kAllowedJerk = 1.05, kFastShare = 0.85;
+  static constexpr double kAllowedShare = 1.001, kAllowedJerk = 1.05, kFastShare = 0.85,
+                          kShare = 0.5;
 
   explicit RatePlanner(const Machine& machine);
 
   /// A change that begins at `start` of the path. Towards 1 it ends at a whole cycle of the path.
-  std::optional<RateChange> change(const Trajectory& run, double start, double from,
-                                   double to) const;
+  /// `share`: of the limits, for the shortest one tried.
+  std::optional<RateChange> change(const Trajectory& run, double start, double from, double to,
+                                   double share = kShare) const;
   /// One that ends at `end` and begins not before `earliest`.
   std::optional<RateChange> change_ending(const Trajectory& run, double end, double from, double to,
                                           double earliest) const;
@@ -45,7 +47,8 @@ class RatePlanner {
   static double block_end(const Trajectory& run, double tau);
 
  private:
-  double shortest_time(const Trajectory& run, double at, double difference) const;
+  double shortest_time(const Trajectory& run, double at, double difference,
+                       double share = kShare) const;
   bool keeps_limits(const Trajectory& run, const RateChange& change) const;
   const MotionLimits& limits(const Trajectory& run) const;
 

@@ -1,10 +1,9 @@
 #include "diagnosis/diagnose.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <optional>
 
 #include "diagnosis/findings.hpp"
-#include "diagnosis/search/differential.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/period_slip_search.hpp"
 
@@ -16,59 +15,59 @@ namespace {
 constexpr double kFormAllowance = 0.001;
 /// Part that the form of the model may leave at most, and how much of it an effect must explain.
 constexpr double kForm = 0.04, kShareOfForm = 0.15;
-/// A reading is not told where it is off by more than this, of its roughness.
-constexpr double kUntold = 20;
+/// Part of what is explained that a model of it may be wrong by.
+constexpr double kShareOfFound = 0.005;
 
-/// Standard deviation of what is not smooth in a signal: of second differences, by their median.
-double roughness(const std::vector<double>& value) {
-  std::vector<double> second;
-  for (std::size_t k = 2; k < value.size(); ++k)
-    if (const double d = std::abs(value[k] - 2 * value[k - 1] + value[k - 2]); std::isfinite(d))
-      second.push_back(d);
-  if (second.empty()) return 0;
-  const auto middle = second.begin() + static_cast<std::ptrdiff_t>(second.size() / 2);
-  std::nth_element(second.begin(), middle, second.end());
-  return 1.4826 * *middle / std::sqrt(6.0);
+/// What a model gets wrong about the readings of a healthy machine changes by this share when the
+/// piece is clamped anew and friction is that of another day.
+constexpr double kChangeOfForm = 0.05;
+
+/// Chi-square of the held-out laps that this makes.
+std::vector<double> forms_of(const Evidence& evidence, const DifferentialRecord& difference) {
+  const std::vector<ComparedChannel>& channels = evidence.replica().channels();
+  std::vector<double> forms(channels.size(), 0.0);
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    if (channels[c].kind != SignalKind::deflection) continue;
+    const double changed = kChangeOfForm * difference.off[channels[c].axis] /
+                           (difference.noise_scale * evidence.noise().channels[c].rms);
+    forms[c] = evidence.count(c, Role::held_out) * changed * changed;
+  }
+  return forms;
 }
 
-/// Where the model does not tell what the healthy machine read, as in the moment of touching or
-/// while the drag on the ball turns over, it does not tell what a change does to it either.
-void leave_out_untold(Record& difference, const Record& now) {
-  for (MeasuredSignal& signal : difference.signals) {
-    if (signal.kind != SignalKind::deflection) continue;
-    const std::vector<double>& measured = now.find(signal.kind, signal.axis)->value;
-    const double most = kUntold * std::max(roughness(measured), signal.resolution);
-    if (most <= 0) continue;
-    for (std::size_t k = 0; k < measured.size(); ++k)
-      if (std::abs(measured[k] - signal.value[k]) > most) signal.value[k] = kMissing;
-  }
+/// The record of the case is what is explained: what was measured, or `difference`.
+Diagnosis explained(const DiagnosisCase& of, const Record& raw,
+                    const DifferentialRecord* difference, DiagnosisOptions options,
+                    const KeepGoing& keep_going) {
+  Machine declared = of.declared;
+  std::optional<PeriodSlip> slip;
+  if (declared.effects.get<PeriodSlip>().null())
+    slip = find_period_slip(raw, of.replica.channels(), of.replica.predict(declared),
+                            declared.probe.signal_period);
+  if (slip) declared.effects.get<PeriodSlip>() = *slip;
+  Evidence evidence(of.record, of.replica, declared, difference ? difference->noise_scale : 1);
+  if (difference) options.form_of_channel = forms_of(evidence, *difference);
+  options.least_gain =
+      std::max(options.least_gain, kFormAllowance * evidence.count(Role::held_out));
+  options.form = kForm * evidence.count(Role::held_out);
+  options.share_of_form = kShareOfForm;
+  options.share_of_found = kShareOfFound;
+  SelectionResult selection =
+      select_effects_of(evidence, declared, of.candidates, options, keep_going);
+  return findings_of(of, evidence, options, std::move(selection), slip, difference != nullptr);
 }
 
 }  // namespace
 
-Diagnosis diagnose(const DiagnosisCase& of, const std::optional<HealthyRun>& healthy,
+Diagnosis diagnose(const DiagnosisCase& of, const DiagnosisOptions& options,
+                   const KeepGoing& keep_going) {
+  return explained(of, of.record, nullptr, options, keep_going);
+}
+
+Diagnosis diagnose(const DiagnosisCase& of, const DifferentialRecord& difference,
                    const DiagnosisOptions& options, const KeepGoing& keep_going) {
-  DifferentialRecord record{of.record, 1};
-  if (healthy) {
-    record = less_healthy(of.record, healthy->record, healthy->replica, of.declared);
-    leave_out_untold(record.record, of.record);
-  }
-  Machine declared = of.declared;
-  std::optional<PeriodSlip> slip;
-  if (declared.effects.get<PeriodSlip>().null())
-    slip = find_period_slip(of.record, of.replica.channels(), of.replica.predict(declared),
-                            declared.probe.signal_period);
-  if (slip) declared.effects.get<PeriodSlip>() = *slip;
-  Evidence evidence(record.record, of.replica, declared, record.noise_scale);
-  const DiagnosisCase seen{record.record, of.replica, of.declared, of.candidates};
-  DiagnosisOptions careful = options;
-  careful.least_gain =
-      std::max(options.least_gain, kFormAllowance * evidence.count(Role::held_out));
-  careful.form = kForm * evidence.count(Role::held_out);
-  careful.share_of_form = kShareOfForm;
-  SelectionResult selection =
-      select_effects_of(evidence, declared, of.candidates, careful, keep_going);
-  return findings_of(seen, evidence, careful, std::move(selection), slip, healthy.has_value());
+  return explained({difference.record, of.replica, difference.healthy, of.candidates}, of.record,
+                   &difference, options, keep_going);
 }
 
 std::vector<SignalFigure> figures_of(const Record& record, Replica& replica,

@@ -22,8 +22,9 @@ constexpr double kLeastContour = 0.01, kLeastOfNoise = 0.1;
 /// Part of the noise's chi-square that no law is sought in.
 constexpr double kFloorScatter = 0.04;
 constexpr double kGainAtLimit = 25;  ///< of five standard deviations
-/// A number that costs less chi-square to be as declared is put back.
-constexpr double kUnneeded = 4;
+/// A number that costs less chi-square to be as declared is put back: this much, or this part of
+/// what an effect must gain.
+constexpr double kUnneeded = 4, kUnneededPart = 0.25;
 
 const EffectText* text_of(const std::string& effect) {
   const EffectText* text = nullptr;
@@ -145,7 +146,7 @@ class Report {
       };
       while (std::count_if(a.numbers.begin(), a.numbers.end(), is_amplitude) > 1) {
         const double chi2 = evidence_.chi2(m.residual, Role::both);
-        double least = kUnneeded;
+        double least = std::max(kUnneeded, kUnneededPart * options_.least_gain);
         std::size_t which = a.numbers.size();
         Machine without;
         for (std::size_t i = 0; i < a.numbers.size(); ++i) {
@@ -313,7 +314,8 @@ class Report {
       FoundEffect& e = by_effect[name];
       e.numbers.push_back(
           {key, n.value, n.value - i->second.half_width, n.value + i->second.half_width});
-      if (std::abs(n.value) < worth || std::abs(n.value) < 2.5 * i->second.half_width) continue;
+      const double moved = std::abs(n.value - n.centre);
+      if (moved < worth || moved < 2.5 * i->second.half_width) continue;
       e.name = name;
       e.place = "setup";
       e.acquisition = true;
@@ -328,9 +330,11 @@ class Report {
       }
       std::string text =
           fmt::format("{}: the piece is not where it was in the reference run", name);
-      for (const FittedNumber& n : e.numbers)
-        if (n.high - n.low < std::abs(n.value))
-          text += fmt::format(", {} {:.1f}", n.key.substr(n.key.find('.', 14) + 1), n.value);
+      for (const FittedNumber& n : e.numbers) {
+        const double moved = n.value - number_of(of_.declared, n.key);
+        if (n.high - n.low < std::abs(moved))
+          text += fmt::format(", {} {:+.1f}", n.key.substr(n.key.find('.', 14) + 1), moved);
+      }
       d_.notes.push_back(text + ".");
     }
   }
@@ -370,13 +374,14 @@ class Report {
   void tell_law() {
     const double left = excess(found().held_out);
     if (left < options_.law_gain + kFloorScatter * floor_) return;
+    const double needed = std::max({options_.law_gain, options_.least_share * left,
+                                    options_.share_of_form * std::min(left, options_.form)});
     LawFit law = best_law(evidence_, found(), options_);
     // A law that does better than a single named effect takes its name away.
     if (found().added.size() == 1) {
       LawFit instead = best_law(evidence_, selection_.base, options_);
       const double named = selection_.base.held_out - found().held_out;
-      if (instead.gain > named + options_.law_gain &&
-          instead.gain > 0.5 * (named + std::max(0.0, law.gain))) {
+      if (instead.gain > named + needed && instead.gain > 0.5 * (named + std::max(0.0, law.gain))) {
         d_.notes.push_back(fmt::format("It looks like {}, but {} fits better.",
                                        of_.candidates[found().added[0].candidate].name(),
                                        words_of(instead.law.law)));
@@ -387,7 +392,7 @@ class Report {
         law = std::move(instead);
       }
     }
-    if (law.gain < std::max(options_.law_gain, options_.least_share * left)) return;
+    if (law.gain < needed) return;
     law_gain_ = law.gain;
     d_.law = law.law;
     d_.found = law.machine;

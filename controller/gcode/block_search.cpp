@@ -40,8 +40,9 @@ std::string text_of(const BlockStart& start) {
                     i + 1 < kAxisCount && is_rotary(i) == is_rotary(i + 1) ? ""
                     : is_rotary(i)                                         ? "deg, "
                                                                            : "mm, ");
-  text += start.work_offset < 6 ? fmt::format("G{}", 54 + start.work_offset)
-                                : fmt::format("G59.{}", start.work_offset - 5);
+  text += start.work_offset < 6   ? fmt::format("G{}", 54 + start.work_offset)
+          : start.work_offset < 9 ? fmt::format("G59.{}", start.work_offset - 5)
+                                  : fmt::format("G54.1 P{}", start.work_offset - 8);
   text += fmt::format(", T{} H{}", start.tool, start.length);
   if (start.feed > 0) text += fmt::format(", F{:g}", start.feed * 60e3);
   if (start.spindle.speed > 0)
@@ -80,9 +81,15 @@ BlockStart ProgramRun::run_to(int line) {
   if (modal_.motion >= 730 && modal_.motion != 800)
     refuse(fmt::format("the cycle {} is active; begin where it is called, or behind G80",
                        code_name(modal_.motion)));
+  if (guessed_ != 0)
+    refuse(
+        fmt::format("line {} probes, and what it has found is not known; begin at or before it, "
+                    "or with the --memory of the run that probed",
+                    guessed_));
   if (modal_macro_ != 0) refuse("the macro of G66 is active; begin where it is called");
   BlockStart start;
   start.line = line;
+  start.probings = probings_;
   start.position = map_.to_axes(position_);
   start.spindle.line = line;
   start.spindle.mode = modal_.spindle == 3    ? SpindleWord::Mode::clockwise

@@ -16,6 +16,7 @@ struct BlockStart {
   int tool = 0, length = 0;                    ///< T in the spindle, H
   std::size_t work_offset = 0;                 ///< 0: G54
   double feed = 0;                             ///< [m/s], 0: none
+  std::size_t probings = 0;                    ///< probing moves before it
 };
 
 /// The line of a program file that begins with N`number`. Throws ProgramError where there is none,

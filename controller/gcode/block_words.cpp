@@ -29,7 +29,7 @@ void BlockWords::enter_g(int tenths, int column) {
 void BlockWords::enter(char letter, double value, int column) {
   if (letter == 'G') {
     const int tenths = whole_number(10 * value);
-    if (tenths < 0 || tenths == kCircleThroughPoint)
+    if (tenths < 0 || tenths == kCircleThroughPoint || tenths == kTangentialCircle)
       throw LineError(fmt::format("unknown G{:g}; allowed are {}", value, kKnownG), column);
     enter_g(tenths, column);
   } else if (letter == 'M') {

@@ -108,6 +108,16 @@ double Cursor::spaced_number(const char* from) {
   }
 }
 
+void skip_number(Cursor& at) {
+  at.skip_blanks();
+  if (at.peek() == '/') at.advance();
+  at.skip_blanks();
+  if (upper(at.peek()) != 'N' || !is_digit(at.peek(1))) return;
+  at.advance();
+  while (is_digit(at.peek())) at.advance();
+  at.skip_blanks();
+}
+
 int whole_number(double value) {
   const double whole = std::round(value);
   return value >= -1e-6 && value < 1e9 && std::abs(value - whole) < 1e-6 ? static_cast<int>(whole)

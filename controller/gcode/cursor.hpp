@@ -18,6 +18,7 @@ class LineError : public ProgramError {
 
 inline bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
 inline bool is_digit(char c) { return c >= '0' && c <= '9'; }
+inline char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; }
 inline char upper(char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c; }
 
 class Cursor {
@@ -63,6 +64,9 @@ class Cursor {
   [[noreturn]] void malformed(const char* from) const;
   const char *begin_, *p_, *end_;
 };
+
+/// Past blanks, block delete and N at the begin of a line.
+void skip_number(Cursor& at);
 
 /// A number that must be whole (to 1e-6) and not negative, or -1.
 int whole_number(double value);

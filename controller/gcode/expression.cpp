@@ -21,6 +21,7 @@ enum class Op {
   times,
   divide,
   mod,
+  quotient,
   plus,
   minus,
   eq,
@@ -44,8 +45,27 @@ constexpr OpWord kOpWords[] = {{"MOD", Op::mod, 5},   {"EQ", Op::eq, 3},      {"
                                {"LE", Op::le, 3},     {"AND", Op::op_and, 2}, {"OR", Op::op_or, 2},
                                {"XOR", Op::op_xor, 2}};
 
+/// Of Siemens, where relations bind least. The longer ones first.
+constexpr OpWord kSiemensOps[] = {
+    {"==", Op::eq, 0},      {"<>", Op::ne, 0},      {">=", Op::ge, 0},   {"<=", Op::le, 0},
+    {">", Op::gt, 0},       {"<", Op::lt, 0},       {"MOD", Op::mod, 5}, {"DIV", Op::quotient, 5},
+    {"AND", Op::op_and, 3}, {"XOR", Op::op_xor, 2}, {"OR", Op::op_or, 1}};
+
+std::optional<OpWord> take_siemens_operator(Cursor& at, int lowest) {
+  for (const OpWord& word : kSiemensOps) {
+    bool same = true;
+    for (std::size_t i = 0; same && i < word.text.size(); ++i)
+      same = upper(at.peek(i)) == word.text[i];
+    if (!same || (is_letter(word.text[0]) && is_letter(at.peek(word.text.size())))) continue;
+    if (word.rank < lowest) return std::nullopt;
+    at.advance(word.text.size());
+    return word;
+  }
+  return std::nullopt;
+}
+
 /// The operator that stands here; taken only if its rank is at least `lowest`.
-std::optional<OpWord> take_operator(Cursor& at, int lowest) {
+std::optional<OpWord> take_operator(Cursor& at, int lowest, bool siemens) {
   at.skip_blanks();
   const auto symbol = [&](std::size_t length, Op op, int rank) -> std::optional<OpWord> {
     if (rank < lowest) return std::nullopt;
@@ -64,6 +84,7 @@ std::optional<OpWord> take_operator(Cursor& at, int lowest) {
     default:
       break;
   }
+  if (siemens) return take_siemens_operator(at, lowest);
   for (const OpWord& word : kOpWords) {
     bool same = true;
     for (std::size_t i = 0; same && i < word.text.size(); ++i)
@@ -104,6 +125,10 @@ double apply(Op op, double a, double b, int column) {
       if (b == 0) throw LineError("MOD 0", column);
       result = std::fmod(a, b);
       if (result < 0) result += std::abs(b);
+      break;
+    case Op::quotient:
+      if (b == 0) throw LineError("DIV 0", column);
+      result = std::trunc(a / b);
       break;
     case Op::plus:
       result = a + b;
@@ -210,6 +235,7 @@ double Evaluator::value(Cursor& at, int depth) const {
     return std::isnan(x) && !vacant_ ? 0 : x;
   }
   if (is_letter(c)) return function(at, depth + 1);
+  if (siemens_ && c == '$') return system_variable(at);
   throw LineError(at.at_end() ? std::string("a number is missing")
                               : fmt::format("a number was expected, not '{}'", c),
                   column);
@@ -251,7 +277,7 @@ double Evaluator::expression(Cursor& at, int lowest_rank, int depth) const {
   while (true) {
     at.skip_blanks();
     const int column = at.column();
-    const std::optional<OpWord> next = take_operator(at, lowest_rank);
+    const std::optional<OpWord> next = take_operator(at, lowest_rank, siemens_);
     if (!next) return left;
     left = apply(next->op, left, expression(at, next->rank + 1, depth), column);
   }
@@ -309,6 +335,26 @@ double Evaluator::arc_tangent_of_two(Cursor& at, int depth) const {
   return std::atan2(y, x) / kDegree;
 }
 
+/// $NAME or $NAME[index], kept by the control under its name in lower case with _ before it.
+double Evaluator::system_variable(Cursor& at) const {
+  const int column = at.column();
+  std::string name = "_$";
+  at.advance();
+  for (; is_letter(at.peek()) || is_digit(at.peek()) || at.peek() == '_'; at.advance())
+    name += lower(at.peek());
+  if (at.peek() == '[') {
+    for (; !at.at_end() && at.peek() != ']'; at.advance())
+      if (at.peek() != ' ') name += lower(at.peek());
+    if (!at.take(']')) throw LineError("'[' without its ']'", column);
+    name += ']';
+  }
+  if (const std::optional<double> x = parameters_.read(name)) return *x;
+  throw LineError(fmt::format("unknown {}; allowed are $AA_IW[axis] $AA_IM[axis] $AA_MW[axis] "
+                              "$AA_MM[axis] $AC_MEA[1]",
+                              at.since(column)),
+                  column);
+}
+
 double Evaluator::function(Cursor& at, int depth) const {
   const int column = at.column();
   const std::string name = at.letters();
@@ -317,6 +363,9 @@ double Evaluator::function(Cursor& at, int depth) const {
     const double x = parameters_.read(r_parameter(at, depth));
     return set_or_zero(x);
   }
+  if (siemens_ && name == "NOT") return set_or_zero(value(at, depth)) == 0;
+  if (siemens_ && name == "TRUE") return 1;
+  if (siemens_ && name == "FALSE") return 0;
   at.skip_blanks();
   if (siemens_ && name == "ATAN" && at.peek() == '2') return arc_tangent_of_two(at, depth);
   if (name == "EXISTS") return exists(at, depth);

@@ -5,7 +5,9 @@
 //     6  **     5  * / MOD     4  + -     3  EQ NE GT GE LT LE     2  AND OR XOR
 //   functions   ABS ACOS ASIN COS EXP FIX FUP LN ROUND SIN SQRT TAN, ATAN[y]/[x], EXISTS[#..];
 //               of macros also POW[x,y], MAX[,], MIN[,], SGN
-//   Siemens     also R1, R[expression], brackets ( ), POT (square), TRUNC, ATAN2(y,x)
+//   Siemens     also R1, R[expression], brackets ( ), POT (square), TRUNC, ATAN2(y,x), TRUE, FALSE,
+//               NOT value, $AA_IW[X] (system variables); of the words MOD DIV 5, AND 3, XOR 2, OR
+//               1, then == <> > >= < <= 0: relations bind least there
 //
 // Angles in degrees. FIX rounds down, FUP up. EQ and NE compare to 1e-6; relations and logic give 1
 // or 0. Source: NIST RS274/NGC interpreter, version 3 (NISTIR 6556), chapter 3.3; Fanuc custom
@@ -50,6 +52,7 @@ class Evaluator {
   bool opens(char c) const { return c == '[' || (siemens_ && c == '('); }
   double arc_tangent_of_two(Cursor& at, int depth) const;
   double exists(Cursor& at, int depth) const;
+  double system_variable(Cursor& at) const;
 
   const Parameters& parameters_;
   const bool& vacant_;

@@ -69,20 +69,20 @@ std::optional<FlowLine> o_line(Cursor& at) {
     at.skip_blanks();
     if (at.letters() != "CALL")
       throw LineError("an O word with a computed label; allowed is that for call only", column);
-    return FlowLine{Kind::call, {}, {}, "", -1, -1};
+    return FlowLine{.kind = Kind::call};
   } else {
     throw LineError("O without its number or <name>", column);
   }
   at.skip_blanks();
   const std::string word = at.letters();
   for (const KindWord& known : kWords)
-    if (word == known.word) return FlowLine{known.kind, {}, {}, label, -1, -1};
+    if (word == known.word) return FlowLine{.kind = known.kind, .label = label};
   if (label.front() == '<' || word.size() > 1)
     throw LineError(fmt::format("O{} {}: unknown; allowed are sub endsub return call if elseif "
                                 "else endif while endwhile do repeat endrepeat break continue",
                                 label, word),
                     column);
-  return FlowLine{Kind::program, {}, {}, label, -1, -1};
+  return FlowLine{.kind = Kind::program, .label = label};
 }
 
 /// The number behind DO or END, as a label of its own kind.
@@ -107,11 +107,44 @@ std::optional<FlowLine> macro_line(Cursor& at, bool& macros) {
     skip_bracketed(at);
     at.skip_blanks();
     if (!at.take_word("DO")) throw LineError("WHILE [..] is followed by DO n", at.column());
-    return FlowLine{Kind::macro_while, {}, {}, do_label(at), -1, -1};
+    return FlowLine{.kind = Kind::macro_while, .label = do_label(at)};
   }
   if (word == "DO" || word == "END") {
     at.advance(word.size());
-    return FlowLine{word == "DO" ? Kind::macro_do : Kind::macro_end, {}, {}, do_label(at), -1, -1};
+    return FlowLine{.kind = word == "DO" ? Kind::macro_do : Kind::macro_end, .label = do_label(at)};
+  }
+  return std::nullopt;
+}
+
+[[noreturn]] void refuse(const std::string& path, const FlowLine& line, const std::string& why) {
+  throw ProgramError(fmt::format("{}:{}:{}: {}", path, line.place.line, line.column, why));
+}
+
+/// As it is written: "O100 if", "DO1", "WHILE".
+std::string name_of(const FlowLine& line) {
+  const std::string word = flow_word(line.kind);
+  if (line.label.empty()) return word;
+  return line.label.starts_with("DO") ? fmt::format("{} {}", word, line.label)
+                                      : fmt::format("O{} {}", line.label, word);
+}
+
+constexpr KindWord kSiemensWords[] = {
+    {"IF", Kind::when},          {"ELSE", Kind::otherwise},     {"ENDIF", Kind::end_when},
+    {"WHILE", Kind::loop_while}, {"ENDWHILE", Kind::end_while}, {"FOR", Kind::loop_for},
+    {"ENDFOR", Kind::end_for},   {"REPEAT", Kind::loop_until},  {"UNTIL", Kind::until},
+    {"LOOP", Kind::loop_ever},   {"ENDLOOP", Kind::end_ever}};
+
+/// IF that only decides about a jump is a block like others.
+std::optional<FlowLine> siemens_line(Cursor& at) {
+  const std::string word = at.letters();
+  for (const KindWord& known : kSiemensWords) {
+    if (word != known.word) continue;
+    if (known.kind == Kind::when) {
+      std::string rest(at.rest().substr(0, at.rest().find(';')));
+      for (char& c : rest) c = upper(c);
+      if (rest.find("GOTO") != std::string::npos) return std::nullopt;
+    }
+    return FlowLine{.kind = known.kind};
   }
   return std::nullopt;
 }
@@ -135,12 +168,24 @@ const char* flow_word(Kind kind) {
       return "DO";
     case Kind::macro_end:
       return "END";
+    case Kind::loop_for:
+      return "FOR";
+    case Kind::end_for:
+      return "ENDFOR";
+    case Kind::loop_until:
+      return "REPEAT";
+    case Kind::until:
+      return "UNTIL";
+    case Kind::loop_ever:
+      return "LOOP";
+    case Kind::end_ever:
+      return "ENDLOOP";
     default:
       return "";
   }
 }
 
-FlowIndex::FlowIndex(ProgramText& text) {
+FlowIndex::FlowIndex(ProgramText& text, bool siemens) {
   text.go_to({});
   int percents = 0;
   for (std::string_view line; text.next(line);) {
@@ -157,14 +202,20 @@ FlowIndex::FlowIndex(ProgramText& text) {
       at.skip_blanks();
     }
     const char first = upper(at.peek());
-    if (!begins_flow(first)) continue;
+    if (siemens ? std::string_view("IEWFRUL").find(first) == std::string_view::npos
+                : !begins_flow(first))
+      continue;
     if (first == 'G' && upper(at.peek(1)) != 'O' && at.peek(1) != '6') continue;
     if (at.letters().starts_with("ORI")) continue;  // of Siemens
+    const int column = at.column();
     try {
-      const std::optional<FlowLine> found =
-          first == 'O' || first == ':' ? o_line(at) : macro_line(at, macros_);
+      const std::optional<FlowLine> found = siemens ? siemens_line(at)
+                                            : first == 'O' || first == ':'
+                                                ? o_line(at)
+                                                : macro_line(at, macros_);
       if (!found) continue;
       FlowLine entry = *found;
+      entry.column = column;
       entry.place = text.last();
       entry.after = text.here();
       enter(std::move(entry), text.path());
@@ -176,10 +227,7 @@ FlowIndex::FlowIndex(ProgramText& text) {
   for (const int i : open_) {
     const FlowLine& line = lines_[static_cast<std::size_t>(i)];
     if (line.kind == Kind::program) continue;
-    throw ProgramError(
-        fmt::format("{}:{}: {} {} without its end", text.path(), line.place.line,
-                    line.label.starts_with("DO") ? line.label : fmt::format("O{}", line.label),
-                    flow_word(line.kind)));
+    refuse(text.path(), line, name_of(line) + " without its end");
   }
   open_ = {};
   text.go_to({});
@@ -188,26 +236,20 @@ FlowIndex::FlowIndex(ProgramText& text) {
 /// Takes the innermost open line off, which must have the label and be of one of the kinds.
 int FlowIndex::close(const FlowLine& line, const std::string& path,
                      std::initializer_list<Kind> by) {
-  const auto name = [](const FlowLine& l) {
-    return l.label.starts_with("DO") ? fmt::format("{} {}", flow_word(l.kind), l.label)
-                                     : fmt::format("O{} {}", l.label, flow_word(l.kind));
-  };
-  if (open_.empty())
-    throw ProgramError(
-        fmt::format("{}:{}: {} without its begin", path, line.place.line, name(line)));
+  if (open_.empty()) refuse(path, line, name_of(line) + " without its begin");
   const int i = open_.back();
   const FlowLine& begin = lines_[static_cast<std::size_t>(i)];
   if (begin.label != line.label || std::find(by.begin(), by.end(), begin.kind) == by.end())
-    throw ProgramError(fmt::format("{}:{}: {} while {} of line {} is open", path, line.place.line,
-                                   name(line), name(begin), begin.place.line));
+    refuse(path, line,
+           fmt::format("{} while {} of line {} is open", name_of(line), name_of(begin),
+                       begin.place.line));
   open_.pop_back();
   return i;
 }
 
 void FlowIndex::enter(FlowLine line, const std::string& path) {
   if (lines_.size() >= kMostLines)
-    throw ProgramError(fmt::format("{}:{}: more than {} lines with O words or loops", path,
-                                   line.place.line, kMostLines));
+    refuse(path, line, fmt::format("more than {} lines with O words or loops", kMostLines));
   const int me = static_cast<int>(lines_.size());
   const auto joined = [&](int begin) {
     line.next = begin;
@@ -216,12 +258,11 @@ void FlowIndex::enter(FlowLine line, const std::string& path) {
   switch (line.kind) {
     case Kind::sub:
       if (!open_.empty())
-        throw ProgramError(fmt::format("{}:{}: O{} sub within line {}; a sub stands for itself",
-                                       path, line.place.line, line.label,
-                                       lines_[static_cast<std::size_t>(open_.back())].place.line));
+        refuse(path, line,
+               fmt::format("O{} sub within line {}; a sub stands for itself", line.label,
+                           lines_[static_cast<std::size_t>(open_.back())].place.line));
       if (!subs_.emplace(line.label, me).second)
-        throw ProgramError(
-            fmt::format("{}:{}: O{} sub given twice", path, line.place.line, line.label));
+        refuse(path, line, fmt::format("O{} sub given twice", line.label));
       open(me);
       break;
     case Kind::when:
@@ -229,6 +270,9 @@ void FlowIndex::enter(FlowLine line, const std::string& path) {
     case Kind::repeat:
     case Kind::macro_while:
     case Kind::macro_do:
+    case Kind::loop_for:
+    case Kind::loop_until:
+    case Kind::loop_ever:
       open(me);
       break;
     case Kind::loop_while: {
@@ -254,6 +298,15 @@ void FlowIndex::enter(FlowLine line, const std::string& path) {
       break;
     case Kind::macro_end:
       joined(close(line, path, {Kind::macro_while, Kind::macro_do}));
+      break;
+    case Kind::end_for:
+      joined(close(line, path, {Kind::loop_for}));
+      break;
+    case Kind::until:
+      joined(close(line, path, {Kind::loop_until}));
+      break;
+    case Kind::end_ever:
+      joined(close(line, path, {Kind::loop_ever}));
       break;
     case Kind::else_when:
     case Kind::otherwise:
@@ -282,9 +335,7 @@ void FlowIndex::enter(FlowLine line, const std::string& path) {
                           begin.kind == Kind::repeat;
         if (loop && begin.label == line.label) line.next = *i;
       }
-      if (line.next < 0)
-        throw ProgramError(fmt::format("{}:{}: O{} {} outside a loop of that label", path,
-                                       line.place.line, line.label, flow_word(line.kind)));
+      if (line.next < 0) refuse(path, line, name_of(line) + " outside a loop of that label");
       break;
     case Kind::program:
       programs_.emplace(line.label, me);

@@ -4,6 +4,8 @@
 //            while .. endwhile; do .. while; repeat .. endrepeat; break, continue.
 //            label: 100 or <name>
 //   Fanuc    WHILE [..] DO m .. END m, DO m .. END m
+//   Siemens  IF .. ELSE .. ENDIF, WHILE .. ENDWHILE, FOR .. ENDFOR, REPEAT .. UNTIL,
+//            LOOP .. ENDLOOP; no others then
 //   both     Onumber alone or :number: the head of a program that M98 and G65 can call
 //
 // Made in one pass before the program runs; holds these lines only, so that a program without them
@@ -39,11 +41,18 @@ struct FlowLine {
     program,
     macro_while,
     macro_do,
-    macro_end
+    macro_end,
+    loop_for,
+    end_for,
+    loop_until,
+    until,
+    loop_ever,
+    end_ever
   };
-  Kind kind;
-  ProgramPlace place, after;  ///< of the line, of the one behind it
-  std::string label;          ///< empty where it has to be computed (call)
+  Kind kind = Kind::program;
+  ProgramPlace place{}, after{};  ///< of the line, of the one behind it
+  int column = 1;                 ///< of its word
+  std::string label{};            ///< empty where it has to be computed (call) and for Siemens
   int next = -1;  ///< if: the next branch; begin and end of a loop or sub: each other; break,
                   ///< continue: the begin of their loop
   int end = -1;   ///< if and its branches: the endif
@@ -54,7 +63,7 @@ class FlowIndex {
   static constexpr std::size_t kMostLines = 1'000'000;
 
   /// Reads the whole text and goes back to its begin. Throws ProgramError.
-  explicit FlowIndex(ProgramText& text);
+  explicit FlowIndex(ProgramText& text, bool siemens = false);
 
   bool empty() const { return lines_.empty(); }
   bool macros() const { return macros_; }  ///< IF, WHILE or GOTO of Fanuc were seen

@@ -32,6 +32,12 @@ Block GcodeInterpreter::next() { return run_->next(); }
 
 BlockStart GcodeInterpreter::run_to(int line) { return run_->run_to(line); }
 
+const ProbeTouch& GcodeInterpreter::probing() const { return run_->probing(); }
+
+void GcodeInterpreter::probed(const ProbeTouch& touch) { run_->probed(touch); }
+
+void GcodeInterpreter::forget_touches() { run_->forget_touches(); }
+
 long GcodeInterpreter::passes_of(int line) { return run_->passes_of(line); }
 
 NcData GcodeInterpreter::data() const { return run_->data(); }
@@ -52,11 +58,11 @@ ProgramRun::ProgramRun(const std::string& path, const Machine& machine, Interpre
       second_home_(home_),
       map_(machine.kinematics, {}),
       position_(home_) {
-  units_.push_back(std::make_unique<Unit>(path));
-  fanuc_ = options_.dialect == Dialect::fanuc ||
-           (options_.dialect == Dialect::automatic && unit().flow.macros());
   siemens_dialect_ = options_.dialect == Dialect::siemens ||
                      (options_.dialect == Dialect::automatic && named_as_siemens(path));
+  units_.push_back(std::make_unique<Unit>(path, siemens_dialect_));
+  fanuc_ = options_.dialect == Dialect::fanuc ||
+           (options_.dialect == Dialect::automatic && unit().flow.macros());
   if (fanuc_) parameters_.last_local(LocalParameters::kCount);
   modal_.tolerance = machine.nc.blend_tolerance;
   modal_.dynamics = machine.nc.dynamics;
@@ -86,15 +92,27 @@ void ProgramRun::read_guarded() {
   try {
     read_line();
   } catch (const LineError& error) {
-    const std::string where = unit().text.path() + ":" + std::to_string(line_number());
-    throw ProgramError(error.column > 0
-                           ? fmt::format("{}:{}: {}", where, error.column, error.what())
-                           : fmt::format("{}: {}", where, error.what()));
+    throw ProgramError(fmt::format("{}:{}:{}: {}", unit().text.path(), line_number(),
+                                   error.column > 0 ? error.column : column_of_block(),
+                                   error.what()));
   }
 }
 
+/// Where a block as a whole is to blame: its motion word, else its first axis word, else where it
+/// begins.
+int ProgramRun::column_of_block() const {
+  if (words_.has(GGroup::motion)) return words_.column(GGroup::motion);
+  for (const char letter : kAxisLetters)
+    if (words_.has(letter)) return words_.column(letter);
+  Cursor at(line_);
+  skip_number(at);
+  return at.at_end() ? 1 : at.column();
+}
+
 void ProgramRun::read_line() {
+  words_.clear();
   if (!unit().text.next(line_)) {
+    line_ = {};
     end_of_file();
     return;
   }
@@ -106,13 +124,15 @@ void ProgramRun::read_line() {
       return;
     }
   }
-  words_.clear();
   assignments_.clear();
   vector_given_ = 0;
   siemens_ = 0;
   if (siemens_dialect_) {
     way_.fill(Way::modal);
     via_given_ = 0;
+    siemens_frame_ = SiemensFrame::none;
+    rpl_.reset();
+    measures_ = false;
   }
   if (!read_words(at)) return;
   if (!assignments_.empty()) apply_assignments();
@@ -148,6 +168,7 @@ bool ProgramRun::read_words(Cursor& at) {
     if (is_digit(at.peek())) at.advance();
   }
   for (at.skip_blanks(); !at.at_end(); at.skip_blanks()) {
+    if (siemens_dialect_ && words_.empty() && !take_siemens_label(at).empty()) continue;
     const char c = at.peek();
     if (is_letter(c)) {
       if (is_letter(at.peek(1)) && read_keyword(at)) {
@@ -269,6 +290,7 @@ void ProgramRun::apply_assignments() {
 /// In the order of RS274/NGC: feed, spindle, tool, dwell, modes, offsets, motion, stop.
 void ProgramRun::execute() {
   const int once = words_.code(GGroup::once);
+  if (siemens_frame_ != SiemensFrame::none) set_siemens_frame();
   if (once == 650 || modal_macro_ || words_.has(GGroup::macro) || words_.code(MGroup::stop) >= 98) {
     execute_macro_words();
     if (once == 650 || words_.code(MGroup::stop) >= 98) return;
@@ -292,6 +314,8 @@ void ProgramRun::execute() {
   set_path_mode();
   set_rotation();
   set_tilt();
+  if (words_.has(GGroup::polar)) set_polar();
+  if (words_.has(GGroup::scaling) || words_.has(GGroup::mirror)) set_scaling();
   switch (once) {
     case 51:
       set_dynamics();

@@ -67,6 +67,8 @@ void ProgramRun::emit_cycle(int code) {
   if (words_.any_of("AC")) fail(name + " with A or C; allowed are X Y Z", column);
   const std::size_t n = modal_.normal;
   const auto w = static_cast<Eigen::Index>(n);
+  if (work_.program().linear(w, w) != 1)
+    fail(fmt::format("{} while {} is scaled or mirrored", name, kAxisLetters[n]), column);
   const char letter_w = kAxisLetters[n];
   if (words_.has(GGroup::motion) && !words_.any_of("XYZ"))
     fail(name + " without X, Y or Z", column);
@@ -132,6 +134,7 @@ void ProgramRun::emit_cycle(int code) {
       const double word = length(letter);
       at[axis] = modal_.absolute ? word : at[axis] + word;
     }
+    if (polar_) put_polar(at);
     cycle_move(at, Move::Kind::rapid);
     if (code != 870) {
       at[w] = plane;

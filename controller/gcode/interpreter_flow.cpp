@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <utility>
 
 #include "controller/gcode/interpreter_run.hpp"
@@ -23,23 +24,11 @@ int local_of(char letter) {
   return locals[static_cast<std::size_t>(letter - 'A')];
 }
 
-/// Past "Olabel word" (and N and block delete before it), where the values begin.
-void skip_o_word(Cursor& at) {
-  at.skip_blanks();
-  if (at.peek() == '/') at.advance();
-  at.skip_blanks();
-  if (upper(at.peek()) == 'N' && is_digit(at.peek(1))) {
-    at.advance();
-    while (is_digit(at.peek())) at.advance();
-    at.skip_blanks();
-  }
-}
-
 }  // namespace
 
 double ProgramRun::condition(Cursor& at) {
   at.skip_blanks();
-  const double x = evaluator_.bracketed(at);
+  const double x = siemens_dialect_ ? evaluator_.bare(at) : evaluator_.bracketed(at);
   return std::isnan(x) ? 0 : x;
 }
 
@@ -55,12 +44,14 @@ void ProgramRun::go_to(const ProgramPlace& place) { unit().text.go_to(place); }
 void ProgramRun::steer(int i, Cursor at) {
   const FlowIndex& flow = unit().flow;
   const FlowLine& line = flow.line(i);
-  skip_o_word(at);
+  skip_number(at);
   if (at.column() > 1 && options_.block_delete &&
       line_.find('/') < static_cast<std::size_t>(at.column()))
     return;
   std::string label = line.label;
-  if (line.kind < Flow::program) {
+  if (siemens_dialect_) {
+    at.advance(at.letters().size());
+  } else if (line.kind < Flow::program) {
     at.advance();  // O
     at.skip_blanks();
     if (!label.empty()) {
@@ -99,7 +90,9 @@ void ProgramRun::steer(int i, Cursor at) {
       break;
     case Flow::when:
       for (int branch = i;;) {
-        if (condition(at) != 0) {
+        const bool yes = condition(at) != 0;
+        if (siemens_dialect_) nothing_more();
+        if (yes) {
           if (branch != i) after(branch);
           nothing_more();
           break;
@@ -124,13 +117,56 @@ void ProgramRun::steer(int i, Cursor at) {
     case Flow::end_when:
     case Flow::loop_do:
     case Flow::macro_do:
+    case Flow::loop_until:
+    case Flow::loop_ever:
       nothing_more();
       break;
-    case Flow::loop_while:
-      if (condition(at) == 0) after(line.next);
+    case Flow::loop_while: {
+      const bool yes = condition(at) != 0;
+      if (siemens_dialect_) nothing_more();
+      if (!yes) after(line.next);
+      break;
+    }
+    case Flow::loop_for: {
+      const int variable = siemens_loop_variable(at);
+      if (!at.take('=')) fail("FOR R1=.. TO ..", at.column());
+      parameters_.write(variable, evaluator_.bare(at));
+      const bool yes = siemens_loop_goes_on(at, variable);
+      nothing_more();
+      if (!yes) after(line.next);
+      break;
+    }
+    case Flow::end_for: {
+      nothing_more();
+      count_pass();
+      // The variable and its last value stand in the line of the FOR.
+      go_to(flow.line(line.next).place);
+      unit().text.next(line_);
+      Cursor begin(line_);
+      skip_number(begin);
+      begin.advance(begin.letters().size());
+      const int variable = siemens_loop_variable(begin);
+      begin.take('=');
+      evaluator_.bare(begin);
+      parameters_.write(variable, parameters_.read(variable) + 1);
+      if (!siemens_loop_goes_on(begin, variable)) after(i);
+      break;
+    }
+    case Flow::until: {
+      count_pass();
+      const bool yes = condition(at) != 0;
+      nothing_more();
+      if (!yes) after(line.next);
+      break;
+    }
+    case Flow::end_ever:
+      nothing_more();
+      count_pass();
+      after(line.next);
       break;
     case Flow::end_while:
     case Flow::macro_end:
+      if (siemens_dialect_) nothing_more();
       count_pass();
       go_to(flow.line(line.next).place);
       break;
@@ -208,7 +244,7 @@ std::size_t ProgramRun::find_unit(const std::vector<std::string>& names) {
       if (!fs::is_regular_file(path, error)) continue;
       if (units_.size() >= kMostFiles)
         fail(fmt::format("the program calls more than {} files", kMostFiles));
-      units_.push_back(std::make_unique<Unit>(path.string()));
+      units_.push_back(std::make_unique<Unit>(path.string(), siemens_dialect_));
       return units_.size() - 1;
     }
   return units_.size();
@@ -373,38 +409,57 @@ void ProgramRun::return_from_program() {
 
 // -------------------------------------------------------------------------------------- macros
 
-/// Looks for N behind this line, then from the begin of the program.
 void ProgramRun::jump_to_label(double number, int column) {
-  const long wanted = whole_number(number);
+  const int wanted = whole_number(number);
   if (wanted < 0) fail(fmt::format("GOTO {:g}: allowed is a block number", number), column);
+  if (!jump(fmt::format("N{}", wanted), Search::around))
+    fail(fmt::format("there is no block N{}", wanted), column);
+}
+
+/// What a jump to this line would name: "N10", and for Siemens the label before its colon.
+bool ProgramRun::is_named(std::string_view line, const std::string& name) const {
+  Cursor at(line);
+  at.skip_blanks();
+  if (upper(at.peek()) == 'N' && is_digit(at.peek(1))) {
+    at.advance();
+    if (name == fmt::format("N{}", std::lround(at.number()))) return true;
+  }
+  return siemens_dialect_ && take_siemens_label(at) == name;
+}
+
+/// Looks for a label behind this line, then from the begin of the program, or only one of both.
+/// False: there is none.
+bool ProgramRun::jump(const std::string& name, Search search) {
   count_pass();
-  if (const auto known = labels_.find(wanted); known != labels_.end()) {
+  if (const auto known = labels_.find(name); known != labels_.end() && search == Search::around) {
     go_to(known->second);
-    return;
+    return true;
   }
   const ProgramPlace here = unit().text.here(), me = unit().text.last();
-  for (int round = 0; round < 2; ++round) {
-    go_to(round == 0 ? here : ProgramPlace{});
-    for (std::string_view line; unit().text.next(line);) {
-      Cursor at(line);
-      at.skip_blanks();
-      if (upper(at.peek()) != 'N' || !is_digit(at.peek(1))) continue;
-      at.advance();
-      if (std::lround(at.number()) != wanted) continue;
-      labels_[wanted] = unit().text.last();
+  const auto found = [&](const ProgramPlace& from, std::uint64_t to) {
+    go_to(from);
+    for (std::string_view line; unit().text.here().offset < to && unit().text.next(line);) {
+      if (!is_named(line, name)) continue;
+      if (search == Search::around) labels_[name] = unit().text.last();
       go_to(unit().text.last());
-      return;
+      return true;
     }
-  }
+    return false;
+  };
+  constexpr std::uint64_t kEnd = std::numeric_limits<std::uint64_t>::max();
+  if (search != Search::backwards && found(here, kEnd)) return true;
+  if (search == Search::around && found({}, kEnd)) return true;
+  if (search == Search::backwards && found({}, here.offset)) return true;
   go_to(me);
   unit().text.next(line_);
-  fail(fmt::format("there is no block N{}", wanted), column);
+  return false;
 }
 
 /// IF, GOTO, THEN and the words of Siemens. False: no such word stands here.
 bool ProgramRun::read_keyword(Cursor& at) {
   const int column = at.column();
-  if (at.take_word("IF")) {
+  if (siemens_dialect_ && read_siemens_jump(at)) return true;
+  if (!siemens_dialect_ && at.take_word("IF")) {
     const double yes = condition(at);
     at.skip_blanks();
     const bool jump = upper(at.peek()) == 'G' && at.letters() == "GOTO";
@@ -412,7 +467,7 @@ bool ProgramRun::read_keyword(Cursor& at) {
     if (yes == 0) at.to_end();
     return true;
   }
-  if (at.letters() == "GOTO") {
+  if (!siemens_dialect_ && at.letters() == "GOTO") {
     at.advance(4);
     if (upper(at.peek()) == 'N') at.advance();
     const double number = evaluator_.value(at);

@@ -358,6 +358,7 @@ void ProgramRun::set_cutter() {
     radius = -radius;
   }
   if (radius > kLargestTool) fail(name + ": a tool of more than 2 m", column);
+  if (work_.rotated() && plane_map(name.c_str()).mirrored) left = !left;
   if (radius > 0) compensation_.begin(radius, left, modal_.normal);
 }
 
@@ -367,9 +368,18 @@ void ProgramRun::set_offsets() {
   const int code = words_.code(GGroup::offset);
   if (code < 0) return;
   const int column = words_.column(GGroup::offset);
-  if (fanuc_ && code == 540 && words_.has('P'))
-    fail("G54 P: additional work offsets are unknown; allowed are G54 .. G59.3", column);
-  const auto system = static_cast<std::size_t>(code % 10 ? 5 + code % 10 : code / 10 - 54);
+  auto system = static_cast<std::size_t>(code % 10 ? 5 + code % 10 : code / 10 - 54);
+  if (code == 541 || (fanuc_ && code == 540 && words_.has('P'))) {
+    words_.use("P");
+    if (!words_.has('P')) fail("G54.1 without P (1 to 48)", column);
+    const int p = whole_number(words_.value('P'));
+    if (p < 1 || p > static_cast<int>(WorkCoordinates::kMore))
+      fail(fmt::format("P{:g} of {}: allowed are 1 to {}", words_.value('P'), code_name(code),
+                       WorkCoordinates::kMore),
+           words_.column('P'));
+    system = WorkCoordinates::kSystems + static_cast<std::size_t>(p - 1);
+  }
+  if (system != work_.active && !siemens_dialect_) need_no_scaling(code_name(code).c_str(), column);
   if (system != work_.active) need_no_compensation("change of the work offset", column);
   if (frame_.rtcp && work_.systems[system].rotation != 0)
     fail(fmt::format("{} is rotated and G43.4 is active", code_name(code)), column);
@@ -402,6 +412,86 @@ void ProgramRun::enter_frame() {
   position_ = map_.from_axes(q);
 }
 
+void ProgramRun::need_no_scaling(const char* what, int column) const {
+  if (!siemens_dialect_ && !work_.program().none())
+    fail(fmt::format("{} under G51 or G51.1; cancel with G50 or G50.1 first", what), column);
+}
+
+/// G15, G16: what axis words of the plane are, see put_polar().
+void ProgramRun::set_polar() {
+  if (words_.code(GGroup::polar) == 150) {
+    polar_.reset();
+    return;
+  }
+  const Coordinates here = work_.to_words(position_);
+  const auto u = static_cast<Eigen::Index>((modal_.normal + 1) % 3);
+  const auto v = static_cast<Eigen::Index>((modal_.normal + 2) % 3);
+  polar_.emplace();
+  polar_->radius = std::hypot(here[u], here[v]);
+  polar_->angle = std::atan2(here[v], here[u]);
+}
+
+/// P I J K of G51: a factor below 10, or in thousandths from 100 on.
+double ProgramRun::scale_factor(char letter) const {
+  constexpr double kFactors = 10, kThousandths = 100, kMost = 999'999;
+  const double word = words_.value(letter), size = std::abs(word);
+  const double factor = size < kFactors ? word : word / 1000;
+  const bool allowed = size > 0 && (size < kFactors || (size >= kThousandths && size <= kMost)) &&
+                       (letter != 'P' || word > 0);
+  if (!allowed)
+    fail(fmt::format("{}{:g} of G51: allowed is a factor below 10, or thousandths from 100 on",
+                     letter, word),
+         words_.column(letter));
+  return factor;
+}
+
+/// G51 X Y Z P (I J K), G50: scaling about a point. G51.1 X Y Z, G50.1: mirrored at lines square to
+/// the axes named. Mirrored first, then scaled, then rotated by G68; source: Fanuc series 30i.
+void ProgramRun::set_scaling() {
+  const int scaling = words_.code(GGroup::scaling), mirror = words_.code(GGroup::mirror);
+  const int column = words_.column(scaling >= 0 ? GGroup::scaling : GGroup::mirror);
+  const std::string name = code_name(scaling >= 0 ? scaling : mirror);
+  if (siemens_dialect_) fail(fmt::format("unknown {}; allowed are SCALE and MIRROR", name), column);
+  if (scaling >= 0 && mirror >= 0) fail("G51 and G51.1 in one block; write them in two", column);
+  need_no_compensation(name.c_str(), column);
+  if (work_.g68_angle != 0)
+    fail(fmt::format("{} while coordinates are rotated; cancel with G69 first", name), column);
+  if (words_.any_of("AC")) fail(name + " with A or C; allowed are X Y Z", column);
+  const Coordinates here = work_.to_words(position_);
+  constexpr std::string_view kLinear = "XYZ", kFactors = "IJK";
+  if (scaling == 500) scaling_.factor = Vec3::Ones();
+  if (scaling == 510) {
+    words_.use("XYZPIJK");
+    if (words_.has('P') == words_.any_of(kFactors))
+      fail("G51 needs P (all axes) or I J K (each its own)", column);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      scaling_.centre[row] = words_.has(kLinear[i]) ? length(kLinear[i]) : here[row];
+      const char letter = words_.has('P') ? 'P' : kFactors[i];
+      scaling_.factor[row] = words_.has(letter) ? scale_factor(letter) : 1;
+    }
+  }
+  if (mirror >= 0) words_.use("XYZ");
+  if (mirror == 511 && !words_.any_of(kLinear)) fail("G51.1 without X, Y or Z", column);
+  for (std::size_t i = 0; i < 3 && mirror >= 0; ++i) {
+    const bool named = words_.has(kLinear[i]);
+    if (mirror == 501 && (named || !words_.any_of(kLinear))) scaling_.mirrored[i] = false;
+    if (mirror == 511 && named) {
+      scaling_.mirrored[i] = true;
+      scaling_.mirror[static_cast<Eigen::Index>(i)] = length(kLinear[i]);
+    }
+  }
+  ProgramFrame own;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    const double factor = scaling_.factor[row], side = scaling_.mirrored[i] ? -1 : 1;
+    const double mirrored = scaling_.mirrored[i] ? 2 * scaling_.mirror[row] : 0;
+    own.linear(row, row) = factor * side;
+    own.shift[row] = factor * mirrored + (1 - factor) * scaling_.centre[row];
+  }
+  work_.program(own);
+}
+
 void ProgramRun::set_rotation() {
   const int code = words_.code(GGroup::rotation);
   if (code != 680 && code != 690) return;
@@ -417,9 +507,14 @@ void ProgramRun::set_rotation() {
   if (!words_.has('R')) fail("G68 without R (the angle)", column);
   words_.use("XYR");
   const Coordinates here = work_.to_words(position_);
-  work_.g68_centre = {words_.has('X') ? length('X') : here[0],
-                      words_.has('Y') ? length('Y') : here[1]};
-  const double angle = words_.value('R') * kDegree;
+  Vec3 centre = here.head<3>();
+  if (words_.has('X')) centre[0] = length('X');
+  if (words_.has('Y')) centre[1] = length('Y');
+  // Scaled and mirrored like everything else (Fanuc).
+  const ProgramFrame& own = work_.program();
+  work_.g68_centre = (own.linear * centre + own.shift.head<3>()).head<2>();
+  const double side = own.linear.topLeftCorner<2, 2>().determinant() < 0 ? -1 : 1;
+  const double angle = side * words_.value('R') * kDegree;
   work_.g68_angle = modal_.absolute ? angle : work_.g68_angle + angle;
 }
 
@@ -459,6 +554,11 @@ void ProgramRun::set_by_g10() {
   if (!words_.has('P')) fail("G10 without P", column);
   const int p = whole_number(words_.value('P'));
   need_no_compensation("G10", column);
+  need_no_scaling("G10", column);
+  if (fanuc_ && l == 20) {
+    set_further_offset(p, column);
+    return;
+  }
   if (l == 2 || l == 20) {
     if (p < 0 || p > static_cast<int>(WorkCoordinates::kSystems))
       fail(fmt::format("P{:g} of G10 L{}: allowed are 0 (the active offset) to 9",
@@ -548,8 +648,28 @@ void ProgramRun::set_by_g10() {
   }
 }
 
+/// G10 L20 P of Fanuc: the offsets of G54.1.
+void ProgramRun::set_further_offset(int p, int column) {
+  if (p < 1 || p > static_cast<int>(WorkCoordinates::kMore))
+    fail(fmt::format("P{:g} of G10 L20: allowed are 1 to {} (G54.1)", words_.value('P'),
+                     WorkCoordinates::kMore),
+         words_.column('P'));
+  if (words_.has('R')) fail("R with G10 L20; allowed is it with L2", column);
+  const std::size_t system = WorkCoordinates::kSystems + static_cast<std::size_t>(p - 1);
+  Coordinates& shift = work_.systems[system].shift;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    if (!words_.has(kAxisLetters[i])) continue;
+    const auto row = static_cast<Eigen::Index>(i);
+    const double word = in_si(i, words_.value(kAxisLetters[i]));
+    shift[row] = modal_.absolute ? word : shift[row] + word;
+  }
+  if (system == work_.active) work_.select(system);
+  enter_frame();
+}
+
 void ProgramRun::set_g92() {
   const int code = words_.code(GGroup::once), column = words_.column(GGroup::once);
+  need_no_scaling(code_name(code).c_str(), column);
   need_no_compensation(code_name(code).c_str(), column);
   switch (code) {
     case 921:

@@ -13,6 +13,7 @@ constexpr double kStillTip = 1e-7;      ///< a shorter way counts as a pure turn
 constexpr double kLongestMove = 36000;  ///< [s]; beyond it F is surely a mistake
 constexpr double kLongestDwell = 36000;
 constexpr int kMostTurns = 10'000;
+constexpr std::size_t kMostProbings = 100'000;
 constexpr std::string_view kCentreLetters = "IJK";
 
 bool is_cycle(int code) {
@@ -26,7 +27,7 @@ bool is_cycle(int code) {
 Coordinates ProgramRun::target(bool machine_coordinates) {
   Coordinates end = position_;
   words_.use(kAxisLetters);
-  if (work_.rotated() && !machine_coordinates) {
+  if ((work_.rotated() || polar_) && !machine_coordinates) {
     Coordinates words = work_.to_words(position_);
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       if (!words_.has(kAxisLetters[i])) continue;
@@ -34,7 +35,14 @@ Coordinates ProgramRun::target(bool machine_coordinates) {
       const double word = in_si(i, words_.value(kAxisLetters[i]));
       words[row] = absolute(kAxisLetters[i]) ? word : words[row] + word;
     }
-    return work_.to_frame(words);
+    if (polar_) put_polar(words);
+    Coordinates x = work_.to_frame(words);
+    for (const char letter : {'A', 'C'})
+      if (const Way way = way_[static_cast<std::size_t>(letter - 'A')]; way >= Way::shortest) {
+        const auto row = static_cast<Eigen::Index>(letter == 'A' ? kA : kC);
+        x[row] = turned(x[row], position_[row], way);
+      }
+    return x;
   }
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const char letter = kAxisLetters[i];
@@ -53,6 +61,48 @@ Coordinates ProgramRun::target(bool machine_coordinates) {
   return end;
 }
 
+/// G16: the first axis of the plane is a radius, the second an angle. Under G90 they count from the
+/// 0 of the program and from the first axis, under G91 from the present position and angle.
+void ProgramRun::put_polar(Coordinates& words) {
+  const auto u = static_cast<Eigen::Index>((modal_.normal + 1) % 3);
+  const auto v = static_cast<Eigen::Index>((modal_.normal + 2) % 3);
+  const char radius = kAxisLetters[static_cast<std::size_t>(u)];
+  const char angle = kAxisLetters[static_cast<std::size_t>(v)];
+  if (!words_.has(radius) && !words_.has(angle)) return;
+  if (words_.has(radius)) {
+    const Coordinates here = work_.to_words(position_);
+    polar_->centre = modal_.absolute ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(here[u], here[v]);
+    polar_->radius = length(radius);
+  }
+  if (words_.has(angle))
+    polar_->angle = words_.value(angle) * kDegree + (absolute(angle) ? 0 : polar_->angle);
+  words[u] = polar_->centre[0] + polar_->radius * std::cos(polar_->angle);
+  words[v] = polar_->centre[1] + polar_->radius * std::sin(polar_->angle);
+}
+
+/// How lengths and the sense of rotation in the active plane change on their way into the frame.
+PlaneMap ProgramRun::plane_map(const char* what) const {
+  constexpr double kRounding = 1e-9;
+  const auto n = static_cast<Eigen::Index>(modal_.normal);
+  const auto u = (n + 1) % 3, v = (n + 2) % 3;
+  const Mat3 m = work_.linear();
+  PlaneMap map;
+  map.turn << m(u, u), m(u, v), m(v, u), m(v, v);
+  map.scale = map.turn.col(0).norm();
+  map.mirrored = map.turn.determinant() < 0;
+  const Eigen::Matrix2d square = map.turn.transpose() * map.turn;
+  const double most = kRounding * map.scale * map.scale;
+  if (!square.isApprox(map.scale * map.scale * Eigen::Matrix2d::Identity(), kRounding))
+    fail(fmt::format(
+             "{} while the axes of the plane are scaled differently: it would be an ellipse", what),
+         words_.column(GGroup::motion));
+  if (std::abs(m(n, u)) > most || std::abs(m(n, v)) > most)
+    fail(fmt::format("{} in the plane G{} while coordinates are rotated out of it", what,
+                     19 - modal_.normal),
+         words_.column(GGroup::motion));
+  return map;
+}
+
 /// G43.5 and TRAORI: the tool's direction in the workpiece instead of A and C.
 void ProgramRun::take_tool_vector(Coordinates& end) {
   Vec3 d = Vec3::Zero();
@@ -60,6 +110,8 @@ void ProgramRun::take_tool_vector(Coordinates& end) {
   if (vector_given_) {
     if (modal_.length != GcodeModal::Length::rtcp && modal_.length != GcodeModal::Length::vector)
       fail("A3= B3= C3= without TRAORI");
+    if (!work_.program().shifts_only())
+      fail("A3= B3= C3= under ROT, SCALE or MIRROR; allowed is TRANS");
     d = Vec3(vector_[0], vector_[1], vector_[2]);
   } else if (modal_.length == GcodeModal::Length::vector && words_.any_of("IJK")) {
     words_.use("IJK");
@@ -89,7 +141,8 @@ void ProgramRun::emit_motion() {
   }
   // What G43.1 or G68.2 took are no end points.
   const bool taken = words_.code(GGroup::length) == 431 || words_.code(GGroup::rotation) == 680 ||
-                     words_.code(GGroup::rotation) == 682;
+                     words_.code(GGroup::rotation) == 682 || words_.code(GGroup::scaling) == 510 ||
+                     words_.has(GGroup::mirror);
   const bool explicit_motion = words_.has(GGroup::motion);
   if (taken && explicit_motion && code != 800)
     fail("a motion word and one that takes its axis words in one block; write them in two blocks",
@@ -103,7 +156,7 @@ void ProgramRun::emit_motion() {
     if (moves || explicit_motion) emit_cycle(code);
     return;
   }
-  if (code == 20 || code == 30 || code == kCircleThroughPoint) {
+  if (code == 20 || code == 30 || code == kCircleThroughPoint || code == kTangentialCircle) {
     if (taken) return;
     const bool centre = words_.any_of("IJKR") || via_given_ != 0;
     if (!moves && !centre) {
@@ -131,6 +184,8 @@ void ProgramRun::emit_motion() {
                                     kAxisCount]));
   if (code == 330 || code == 331)
     emit_thread(code);
+  else if (measures_ && code == 10)
+    emit_probe(310);
   else if (code >= 310)
     emit_probe(code);
   else
@@ -168,8 +223,10 @@ void ProgramRun::emit_arc() {
   move.end = target();
   move.kind = Move::Kind::arc;
   try {
-    move.arc =
-        modal_.motion == kCircleThroughPoint ? arc_through_point(move.end) : arc_to(move.end);
+    move.arc = modal_.motion == kCircleThroughPoint ? arc_through_point(move.end)
+               : modal_.motion == kTangentialCircle ? arc_along_tangent(move.end)
+                                                    : arc_to(move.end);
+    if (move.arc.sweep == 0) move.kind = Move::Kind::line;
   } catch (const LineError& error) {
     if (error.column > 0) throw;
     throw LineError(error.what(), column_of_arc());
@@ -178,9 +235,9 @@ void ProgramRun::emit_arc() {
   emit_move(std::move(move));
 }
 
-/// G31, G38.n: in the simulation nothing is touched on the way, so the probe trips at the end.
+/// G31, G38.n.
 void ProgramRun::emit_probe(int code) {
-  const std::string name = code_name(code);
+  const std::string name = measures_ ? "MEAS=" : code_name(code);
   need_no_compensation(name.c_str(), words_.column(GGroup::motion));
   if (modal_.feed != 940) fail(name + " needs a feed per minute (G94)");
   words_.use("P");
@@ -189,12 +246,45 @@ void ProgramRun::emit_probe(int code) {
   move.end = target();
   if ((move.end - move.start).isZero(0)) fail(name + " ends where it starts");
   move.kind = Move::Kind::line;
-  move.probe = move.alone = true;
+  move.probe = code == 382   ? Move::Probe::touch
+               : code == 384 ? Move::Probe::leave
+               : code == 385 ? Move::Probe::leave_or_end
+                             : Move::Probe::touch_or_end;
+  move.alone = true;
   set_move_feed(move);
   move.panel = Move::Panel::fixed;
   emit_move(std::move(move));
-  probed_ = work_.to_words(position_);
-  probe_success_ = 1;
+  if (++probings_ > kMostProbings)
+    fail(fmt::format("more than {} probing moves", kMostProbings), words_.column(GGroup::motion));
+  probing_ = {.line = line_number(), .touched = true};
+  probing_.target = as_axes(work_.to_words(position_));
+  probing_.found = probing_.rest = as_axes(map_.to_axes(position_));
+  if (const ProbeTouch* known = known_touch())
+    probing_ = *known;
+  else if (guessed_ == 0)
+    guessed_ = probing_.line;
+  probed(probing_);
+}
+
+/// What is known of the probing move, if it is the same one: its line and what it is told to do.
+const ProbeTouch* ProgramRun::known_touch() const {
+  constexpr double kRounding = 1e-9;
+  if (probings_ > options_.touches.size()) return nullptr;
+  const ProbeTouch& known = options_.touches[probings_ - 1];
+  bool same = known.line == probing_.line;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    same = same && std::abs(known.target[i] - probing_.target[i]) < kRounding;
+  return same ? &known : nullptr;
+}
+
+void ProgramRun::probed(const ProbeTouch& touch) {
+  probing_ = touch;
+  const auto in_frame = [&](const AxisVector& q) {
+    return map_.from_axes(Eigen::Map<const Coordinates>(q.data()));
+  };
+  position_ = in_frame(touch.rest);
+  probed_ = work_.to_words(in_frame(touch.found));
+  probe_success_ = touch.touched ? 1 : 0;
 }
 
 /// G33, G33.1: a line whose feed is K per turn of the spindle, at the speed that S gives it; what
@@ -283,7 +373,7 @@ Arc ProgramRun::arc_to(const Coordinates& end) {
   if (modal_.length == GcodeModal::Length::vector)
     fail("G2 or G3 while G43.5 is active; allowed are G0 and G1");
   const std::size_t n = modal_.normal;
-  if (n != kZ && work_.rotated()) fail("G2 or G3 in a plane other than G17 while it is rotated");
+  const PlaneMap map = work_.rotated() ? plane_map("G2 or G3") : PlaneMap();
   const auto u = static_cast<Eigen::Index>((n + 1) % 3), v = static_cast<Eigen::Index>((n + 2) % 3);
   if (words_.has(kCentreLetters[n]))
     fail(fmt::format("{} does not lie in the plane G{}", kCentreLetters[n], 19 - n),
@@ -291,7 +381,7 @@ Arc ProgramRun::arc_to(const Coordinates& end) {
   const char centre_u = kCentreLetters[static_cast<std::size_t>(u)];
   const char centre_v = kCentreLetters[static_cast<std::size_t>(v)];
   const bool by_centre = words_.has(centre_u) || words_.has(centre_v);
-  const bool clockwise = modal_.motion == 20;
+  const bool clockwise = (modal_.motion == 20) != map.mirrored;
   if (by_centre == words_.has('R'))
     fail(by_centre ? "arc with R and with I J K; allowed is one of both"
                    : "arc without centre; allowed are I J K or R",
@@ -312,7 +402,7 @@ Arc ProgramRun::arc_to(const Coordinates& end) {
   const Vec2 from(position_[u], position_[v]), to(end[u], end[v]);
   PlanarArc planar;
   if (!by_centre) {
-    planar = arc_of_radius(from, to, length('R'), clockwise, turns);
+    planar = arc_of_radius(from, to, map.scale * length('R'), clockwise, turns);
   } else if (modal_.arc_absolute || centre_absolute) {
     if (!words_.has(centre_u) || !words_.has(centre_v))
       fail(fmt::format("under G90.1 an arc needs {} and {}", centre_u, centre_v));
@@ -326,8 +416,7 @@ Arc ProgramRun::arc_to(const Coordinates& end) {
     if (words_.has(centre_u)) way[0] = length(centre_u);
     if (words_.has(centre_v)) way[1] = length(centre_v);
     if (work_.rotated()) {
-      const double angle = work_.g68_angle + (work_.rtcp ? 0 : work_.g5x().rotation);
-      way = Eigen::Rotation2Dd(angle) * way;
+      way = map.turn * way;
     }
     planar = arc_about(from, to, from + way, clockwise, turns);
   }
@@ -383,6 +472,7 @@ void ProgramRun::emit_reference_return(int code) {
   const std::string name = code_name(code);
   if (frame_.rtcp) fail(name + " while G43.4 is active; cancel with G49 first", column);
   need_no_compensation(name.c_str(), column);
+  need_no_scaling(name.c_str(), column);
   words_.use("P");
   Move move;
   move.kind = Move::Kind::rapid;
@@ -418,6 +508,7 @@ void ProgramRun::emit_tool_align() {
     move.tolerance = modal_.tolerance;
     move.dynamics = modal_.dynamics;
     move.line = line_number();
+    move.column = column_of_block();
     emit(move);
   }
   position_ = map_.from_axes(end);
@@ -429,6 +520,8 @@ void ProgramRun::emit_move(Move move) {
   move.tolerance = modal_.tolerance;
   move.dynamics = modal_.dynamics;
   move.line = line_number();
+  move.column = column_of_block();
+  if (siemens_dialect_) turn_tangent(move);
   position_ = move.end;
   if (move.start == move.end && move.kind != Move::Kind::arc) return;
   emit(std::move(move));

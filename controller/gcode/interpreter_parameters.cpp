@@ -8,6 +8,7 @@
 // In Fanuc programs axes are counted X Y Z A C:
 //   #4001-4022  modal G codes   #4107 D  #4109 F  #4111 H  #4114 N  #4119 S  #4120 T
 //   #5001.. #5041.. position in the work offset   #5021.. in the machine   #5061.. skip position
+//   #4130 P of G54.1   #7001-7005 offset of G54.1 P1, #7021.. P2, ... #7941.. P48
 //   #2001..     tool lengths    #11001.. are not there
 // Source: LinuxCNC user manual, "Parameters"; Fanuc series 30i, custom macro, system variables.
 #include <fmt/format.h>
@@ -34,6 +35,12 @@ double unit_of(Eigen::Index row) { return row >= 3 ? kDegree : kMm; }
 
 /// A number that a program may also write; null: none. `to_si` is the unit of the parameter.
 double* ProgramRun::system_value(int number, double& to_si) {
+  if (fanuc_ && NcData::is_further_offset(number)) {
+    const int n = (number - NcData::kFirstFurther) % NcData::kPerSystem;
+    if (n >= static_cast<int>(kAxisCount)) return nullptr;
+    to_si = unit_of(n);
+    return kept_value(number);
+  }
   const auto of = [&](Coordinates& x, int n) -> double* {
     const Eigen::Index row = fanuc_ ? (n < 5 ? n : -1) : ngc_axis(n);
     if (row < 0) return nullptr;
@@ -66,6 +73,14 @@ double* ProgramRun::kept_value(int number) {
   if (number >= 5161 && number <= 5169) return of(home_, number - 5161);
   if (number >= 5181 && number <= 5189) return of(second_home_, number - 5181);
   if (number >= 5211 && number <= 5219) return of(work_.g92_kept, number - 5211);
+  if (NcData::is_further_offset(number)) {
+    const int n = number - NcData::kFirstFurther;
+    const auto system =
+        WorkCoordinates::kSystems + static_cast<std::size_t>(n / NcData::kPerSystem);
+    return n % NcData::kPerSystem < static_cast<int>(kAxisCount)
+               ? &work_.systems[system].shift[n % NcData::kPerSystem]
+               : nullptr;
+  }
   if (number < 5221 || number > 5390) return nullptr;
   WorkOffset& offset = work_.systems[static_cast<std::size_t>((number - 5221) / 20)];
   const int n = (number - 5221) % 20;
@@ -75,6 +90,9 @@ double* ProgramRun::kept_value(int number) {
 std::map<int, double> ProgramRun::offset_parameters() const {
   std::map<int, double> values;
   for (int number = 5161; number <= 5390; ++number)
+    if (const double* value = const_cast<ProgramRun*>(this)->kept_value(number))
+      values[number] = *value;
+  for (int number = NcData::kFirstFurther; NcData::is_further_offset(number); ++number)
     if (const double* value = const_cast<ProgramRun*>(this)->kept_value(number))
       values[number] = *value;
   values[5210] = ended_ || work_.g92.isZero(0) ? 0 : 1;
@@ -141,6 +159,10 @@ std::optional<double> ProgramRun::read(int number) const {
       return probe_success_;
     case 5210:
       return work_.g92.isZero(0) ? 0 : 1;
+    case 4130:
+      if (fanuc_ && work_.active >= WorkCoordinates::kSystems)
+        return static_cast<double>(work_.active - WorkCoordinates::kSystems + 1);
+      return fanuc_ ? std::optional<double>(0) : std::nullopt;
     case 5220:
       return static_cast<double>(work_.active + 1);
     case 5399:
@@ -190,7 +212,8 @@ std::optional<double> ProgramRun::read(int number) const {
       return modal_.to_initial ? 98 : 99;
     case 4012:
     case 4014:
-      return static_cast<double>(54 + work_.active);
+      return work_.active < WorkCoordinates::kSystems ? static_cast<double>(54 + work_.active)
+                                                      : 54.1;
     case 4107:
       return d_;
     case 4109:
@@ -226,6 +249,23 @@ bool ProgramRun::write(int number, double value) {
       (number >= 5061 && number <= 5070) || (number >= 5400 && number <= 5428) || number == 5220;
   if (read_only) fail(fmt::format("#{} belongs to the control and cannot be set", number));
   return false;
+}
+
+/// Of Siemens: positions in the work offset (W) and in the machine (M), where the axes are (I) and
+/// what was measured (M).
+std::optional<double> ProgramRun::siemens_variable(std::string_view name) const {
+  if (name == "ac_mea[1]") return probe_success_;
+  if (name.size() != 8 || !name.starts_with("aa_") || name[5] != '[') return std::nullopt;
+  const std::size_t axis = kAxisLetters.find(upper(name[6]));
+  const std::string_view which = name.substr(3, 2);
+  if (axis == std::string_view::npos || name[7] != ']') return std::nullopt;
+  const Coordinates x = which == "iw"   ? work_.to_words(position_)
+                        : which == "im" ? map_.to_axes(position_)
+                        : which == "mw"
+                            ? probed_
+                            : Coordinates(Eigen::Map<const Coordinates>(probing_.found.data()));
+  if (which != "iw" && which != "im" && which != "mw" && which != "mm") return std::nullopt;
+  return x[static_cast<Eigen::Index>(axis)] / (is_rotary(axis) ? kDegree : modal_.length_unit);
 }
 
 std::optional<double> ProgramRun::read(std::string_view name) const {
@@ -266,6 +306,7 @@ std::optional<double> ProgramRun::read(std::string_view name) const {
   if (is("_spindle_on")) return modal_.spindle == 3 || modal_.spindle == 4;
   if (is("_spindle_cw")) return modal_.spindle == 3;
   if (is("_mist") || is("_flood") || is("_task") || is("_line")) return 0;
+  if (name.starts_with("_$")) return siemens_variable(name.substr(2));
   if (is("_call_level")) return static_cast<double>(calls_.size());
   if (is("_vmajor")) return 2;
   if (is("_vminor")) return 9;

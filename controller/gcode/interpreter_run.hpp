@@ -46,12 +46,34 @@ struct CycleWords {
   std::optional<double> initial;  ///< height before the first of them
 };
 
+/// How directions in the active plane lie in the frame.
+struct PlaneMap {
+  Eigen::Matrix2d turn = Eigen::Matrix2d::Identity();
+  double scale = 1;
+  bool mirrored = false;
+};
+
+/// G16: what the words of the plane count from, and the last ones.
+struct PolarWords {
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  double radius = 0, angle = 0;
+};
+
+/// G51 and G51.1, in the words of the program.
+struct ScalingWords {
+  Vec3 factor = Vec3::Ones(), centre = Vec3::Zero(), mirror = Vec3::Zero();
+  std::array<bool, 3> mirrored{};
+};
+
 class ProgramRun : public SystemParameters {
  public:
   ProgramRun(const std::string& path, const Machine& machine, InterpreterOptions options);
   Block next();
   BlockStart run_to(int line);
   long passes_of(int line);
+  void probed(const ProbeTouch& touch);
+  const ProbeTouch& probing() const { return probing_; }
+  void forget_touches() { options_.touches.clear(); }
   NcData data() const;
   bool inches() const { return modal_.length_unit != 1e-3; }
   void block_delete(bool on) { options_.block_delete = on; }
@@ -61,9 +83,11 @@ class ProgramRun : public SystemParameters {
   /// How the number of an axis word counts.
   enum class Way : std::uint8_t { modal, absolute, incremental, shortest, upwards, downwards };
   using Flow = FlowLine::Kind;
+  enum class SiemensFrame { none, trans, atrans, rot, arot, scale, ascale, mirror, amirror };
+  enum class Search { forwards, backwards, around };
 
   struct Unit {
-    explicit Unit(const std::string& path) : text(path), flow(text) {}
+    Unit(const std::string& path, bool siemens) : text(path), flow(text, siemens) {}
     ProgramText text;
     FlowIndex flow;
     bool opened = false;  ///< its first % was seen
@@ -87,6 +111,7 @@ class ProgramRun : public SystemParameters {
   // reading: interpreter.cpp
   void read_line();
   void read_guarded();
+  int column_of_block() const;
   bool about_to_read(int line) const;
   bool read_words(Cursor& at);
   void read_letter(Cursor& at);
@@ -113,6 +138,8 @@ class ProgramRun : public SystemParameters {
   void return_from_program();
   void load_arguments(LocalParameters& locals);
   void jump_to_label(double number, int column);
+  bool jump(const std::string& name, Search search);
+  bool is_named(std::string_view line, const std::string& name) const;
   void execute_macro_words();
   std::size_t find_unit(const std::vector<std::string>& names);
   std::vector<std::string> program_folders() const;
@@ -139,14 +166,19 @@ class ProgramRun : public SystemParameters {
   void set_cutter();
   void set_offsets();
   void set_rotation();
+  void set_polar();
+  void set_scaling();
+  double scale_factor(char letter) const;
   void set_tilt();
   void set_modal_stack();
   void set_by_g10();
+  void set_further_offset(int p, int column);
   void set_g92();
   void enter_frame();
   MotionFrame frame() const;
   const ToolEntry& tool(double number, char letter);
   void need_no_compensation(const char* what, int column) const;
+  void need_no_scaling(const char* what, int column) const;
 
   // motion: interpreter_motion.cpp
   void emit_motion();
@@ -154,11 +186,14 @@ class ProgramRun : public SystemParameters {
   void emit_arc();
   int column_of_arc() const;
   void emit_probe(int code);
+  const ProbeTouch* known_touch() const;
   void emit_thread(int code);
   void emit_reference_return(int code);
   void emit_tool_align();
   void emit_dwell();
   Coordinates target(bool machine_coordinates = false);
+  void put_polar(Coordinates& words);
+  PlaneMap plane_map(const char* what) const;
   void take_tool_vector(Coordinates& end);
   Arc arc_to(const Coordinates& end);
   void set_move_feed(Move& move) const;
@@ -175,6 +210,14 @@ class ProgramRun : public SystemParameters {
 
   // the dialect of Siemens: interpreter_siemens.cpp
   bool read_siemens_word(Cursor& at);
+  bool read_siemens_jump(Cursor& at);
+  bool read_siemens_frame(Cursor& at);
+  void set_siemens_frame();
+  int siemens_loop_variable(Cursor& at) const;
+  bool siemens_loop_goes_on(Cursor& at, int variable) const;
+  static std::string take_siemens_label(Cursor& at);
+  Arc arc_along_tangent(const Coordinates& end);
+  void turn_tangent(const Move& move);
   bool read_siemens_address(char letter, Cursor& at, int column);
   double siemens_value(char letter, Cursor& at);
   bool siemens_code(double& number) const;
@@ -193,6 +236,7 @@ class ProgramRun : public SystemParameters {
   std::optional<double> read(int number) const override;
   std::optional<double> read(std::string_view name) const override;
   bool write(int number, double value) override;
+  std::optional<double> siemens_variable(std::string_view name) const;
   double* system_value(int number, double& to_si);
   double* kept_value(int number);
   std::map<int, double> offset_parameters() const;
@@ -210,7 +254,11 @@ class ProgramRun : public SystemParameters {
   int number_ = 0;                  ///< N
   std::array<double, 3> vector_{};  ///< A3= B3= C3=
   unsigned vector_given_ = 0;
-  int siemens_ = 0;              ///< TRAORI: 1, TRAFOOF: 2
+  int siemens_ = 0;                                  ///< TRAORI: 1, TRAFOOF: 2
+  SiemensFrame siemens_frame_ = SiemensFrame::none;  ///< of this block
+  std::optional<double> rpl_;                        ///< RPL=
+  bool measures_ = false;                            ///< MEAS=
+  Vec3 tangent_ = Vec3::Zero();  ///< in which the last motion ended, of length 1; 0: none
   std::array<Way, 26> way_{};    ///< by letter
   std::array<double, 3> via_{};  ///< I1= J1= K1=
   unsigned via_given_ = 0;
@@ -233,15 +281,20 @@ class ProgramRun : public SystemParameters {
   Coordinates home_, second_home_;  ///< G28, G30 [m, rad]
   Coordinates probed_ = Coordinates::Zero();
   double probe_success_ = 0, input_ = 0;
+  ProbeTouch probing_;        ///< the last probing move, as it is taken to have ended
+  std::size_t probings_ = 0;  ///< how many so far
+  int guessed_ = 0;           ///< line of the first whose contact was taken to be its end
   std::optional<double> returned_;
   bool tilted_ = false;
+  std::optional<PolarWords> polar_;  ///< G16
+  ScalingWords scaling_;
   CutterCompensation compensation_;
   CycleWords cycle_;
   std::vector<Call> calls_;
   std::vector<Counter> counters_;
   LocalParameters modal_macro_locals_;
   int modal_macro_ = 0;  ///< G66: program number
-  std::map<long, ProgramPlace> labels_;
+  std::map<std::string, ProgramPlace> labels_;
 
   MotionFrame frame_;
   FrameMap map_;

@@ -18,14 +18,17 @@ enum class GGroup : std::uint8_t {
   cutter,        ///< G40 G41 G42 G41.1 G42.1
   length,        ///< G43 G43.1 G43.2 G43.4 G43.5 G49
   retract,       ///< G98 G99
-  offset,        ///< G54 .. G59.3
+  offset,        ///< G54 .. G59.3 G54.1
   path,          ///< G61 G61.1 G64
   spindle,       ///< G96 G97
   rotation,      ///< G68 G68.2 G69
   macro,         ///< G66 G67
   diameter,      ///< G8
+  polar,         ///< G15 G16
+  scaling,       ///< G50 G51
+  mirror,        ///< G50.1 G51.1
 };
-inline constexpr int kGGroups = 17;
+inline constexpr int kGGroups = 20;
 
 enum class MGroup : std::uint8_t {
   unknown,
@@ -42,6 +45,8 @@ inline constexpr int kMGroups = 9;
 
 /// CIP of Siemens, under a number that no program can write.
 inline constexpr int kCircleThroughPoint = 35;
+/// CT of Siemens, the same way.
+inline constexpr int kTangentialCircle = 36;
 
 /// G codes are counted in tenths: G43.4 is 434.
 GGroup g_group(int tenths);

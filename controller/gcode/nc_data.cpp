@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <limits>
 
 #include "controller/state_bytes.hpp"
 
@@ -10,8 +11,9 @@ namespace vcnc {
 
 namespace {
 
-constexpr std::uint64_t kVersion = 1;
-constexpr int kFirstReference = 5161, kFirstOffset = 5221, kLastOffset = 5390, kPerSystem = 20;
+constexpr std::uint64_t kVersion = 2;
+constexpr int kFirstReference = 5161, kFirstOffset = 5221, kLastOffset = 5390;
+constexpr int kPerSystem = NcData::kPerSystem;
 constexpr int kG92Active = 5210, kRotation = 9, kLinearAxes = 3;
 
 void write(const NcData& data, StateWriter& out) {
@@ -49,6 +51,33 @@ NcData read(StateReader& in) {
   return data;
 }
 
+void write(const std::vector<ProbeTouch>& touches, StateWriter& out) {
+  out.number(touches.size(), 4);
+  for (const ProbeTouch& touch : touches) {
+    out.number(static_cast<std::uint64_t>(touch.line), 4);
+    out.number(touch.touched, 1);
+    out.real(touch.at);
+    for (const AxisVector* q : {&touch.target, &touch.found, &touch.rest})
+      for (const double x : *q) out.real(x);
+  }
+}
+
+std::vector<ProbeTouch> read_touches(StateReader& in) {
+  std::vector<ProbeTouch> touches;
+  for (std::uint64_t count = in.number(4); count > 0 && !in.bad(); --count) {
+    ProbeTouch& touch = touches.emplace_back();
+    const std::uint64_t line = in.number(4), touched = in.number(1);
+    in.require(line <= std::numeric_limits<int>::max() && touched <= 1);
+    touch.line = static_cast<int>(line);
+    touch.touched = touched == 1;
+    touch.at = in.real();
+    in.require(touch.at >= 0);
+    for (AxisVector* q : {&touch.target, &touch.found, &touch.rest})
+      for (double& x : *q) x = in.real();
+  }
+  return touches;
+}
+
 std::string system_name(int system) {
   return system < 6 ? fmt::format("G{}", 54 + system) : fmt::format("G59.{}", system - 5);
 }
@@ -56,6 +85,8 @@ std::string system_name(int system) {
 }  // namespace
 
 double NcData::unit_of(int number) {
+  if (is_further_offset(number))
+    return (number - kFirstFurther) % kPerSystem < kLinearAxes ? 1e-3 : kDegree;
   if (number < kFirstReference || number > kLastOffset || number == kG92Active) return 1;
   const int n = number >= kFirstOffset ? (number - kFirstOffset) % kPerSystem : (number - 1) % 10;
   return n < kLinearAxes ? 1e-3 : kDegree;
@@ -66,15 +97,18 @@ std::vector<std::uint8_t> encode_nc_data(const KeptNcData& data) {
   out.number(kVersion, 1);
   write(data.begin, out);
   write(data.now, out);
+  write(data.touches, out);
   return out.take();
 }
 
 std::optional<KeptNcData> decode_nc_data(std::span<const std::uint8_t> bytes) {
   StateReader in(bytes);
-  in.require(in.number(1) == kVersion);
+  const std::uint64_t version = in.number(1);
+  in.require(version == 1 || version == kVersion);
   KeptNcData data;
   data.begin = read(in);
   data.now = read(in);
+  if (version == kVersion) data.touches = read_touches(in);
   if (!in.whole()) return std::nullopt;
   return data;
 }
@@ -89,6 +123,14 @@ std::string to_text(const NcData& data) {
     if (number >= kFirstOffset && number <= kLastOffset) {
       name = system_name((number - kFirstOffset) / kPerSystem);
       n = (number - kFirstOffset) % kPerSystem;
+    } else if (NcData::is_further_offset(number)) {
+      constexpr std::string_view kFurtherLetters = "XYZAC";
+      n = (number - NcData::kFirstFurther) % kPerSystem;
+      if (n >= static_cast<int>(kFurtherLetters.size())) continue;
+      places[fmt::format("G54.1 P{}", (number - NcData::kFirstFurther) / kPerSystem + 1)] +=
+          fmt::format(" {}{:.4f}", kFurtherLetters[static_cast<std::size_t>(n)],
+                      value / NcData::unit_of(number));
+      continue;
     } else if (number > kG92Active && number < kFirstOffset) {
       name = "G92";
     } else if (number >= 5181 && number < 5190) {

@@ -6,9 +6,10 @@
 // them, offsets and references in m and rad:
 //   #31 .. #5000      of NGC programs          #500 .. #999   of macros
 //   #5161.., #5181..  G28, G30                 #5210..        G92, #5210: it is active
-//   #5221 .. #5390    work offsets
-// As bytes: 1 version (1), 4 count, count x (2 number, 8 value), 4 count, count x (4 tool,
-// 5 x 8 offset, 8 diameter).
+//   #5221 .. #5390    work offsets             #7001 .. #7960   G54.1 P1 .. P48, X Y Z A C each
+// As bytes: 1 version (2), twice 4 count, count x (2 number, 8 value), 4 count, count x (4 tool,
+// 5 x 8 offset, 8 diameter); then 4 count, count x (4 line, 1 touched, 8 at, 15 x 8 target, found,
+// rest). Version 1 ends before the touches.
 // Source: LinuxCNC user manual, "Parameters"; Fanuc series 30i, custom macro.
 #pragma once
 
@@ -19,12 +20,17 @@
 #include <string>
 #include <vector>
 
+#include "controller/gcode/probe_touch.hpp"
 #include "controller/gcode/tool_table.hpp"
 
 namespace vcnc {
 
 struct NcData {
   static constexpr std::size_t kMostTools = 1000;
+  static constexpr int kFirstFurther = 7001, kFurther = 48, kPerSystem = 20;
+  static constexpr bool is_further_offset(int number) {
+    return number >= kFirstFurther && number < kFirstFurther + kFurther * kPerSystem;
+  }
 
   std::map<int, double> parameters;
   std::map<int, ToolEntry> tools;
@@ -43,9 +49,10 @@ constexpr KeptParameters kept_parameters(bool macros) {
 }
 
 /// What a memory holds: the data as they were when the last program began, which is what it goes on
-/// with after an interruption, and as they are.
+/// with after an interruption, and as they are; and what the program has probed.
 struct KeptNcData {
   NcData begin, now;
+  std::vector<ProbeTouch> touches{};
 };
 std::vector<std::uint8_t> encode_nc_data(const KeptNcData& data);
 /// Nothing for bytes that are none.

@@ -57,15 +57,16 @@ bool ProgramText::next(std::string_view& line) {
   begin_ += length + (found ? 1 : 0);
   line = {from, length};
   if (length > kLongestLine + 1)
-    throw ProgramError(
-        fmt::format("{}:{}: line longer than {} characters", path_, number_, kLongestLine));
+    throw ProgramError(fmt::format("{}:{}:{}: line longer than {} characters", path_, number_,
+                                   kLongestLine + 1, kLongestLine));
   if (line.ends_with('\r')) line.remove_suffix(1);
   if (line.size() > kLongestLine)
-    throw ProgramError(
-        fmt::format("{}:{}: line longer than {} characters", path_, number_, kLongestLine));
+    throw ProgramError(fmt::format("{}:{}:{}: line longer than {} characters", path_, number_,
+                                   kLongestLine + 1, kLongestLine));
   if (number_ == 1 && line.starts_with(kByteOrderMark)) line.remove_prefix(kByteOrderMark.size());
-  if (std::memchr(line.data(), '\0', line.size()))
-    throw ProgramError(fmt::format("{}:{}: NUL byte; a program is plain text", path_, number_));
+  if (const void* nul = std::memchr(line.data(), '\0', line.size()))
+    throw ProgramError(fmt::format("{}:{}:{}: NUL byte; a program is plain text", path_, number_,
+                                   static_cast<const char*>(nul) - line.data() + 1));
   return true;
 }
 

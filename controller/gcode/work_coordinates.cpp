@@ -16,6 +16,10 @@ void turn(Coordinates& x, double angle) {
 
 Coordinates WorkCoordinates::to_frame(const Coordinates& word) const {
   Coordinates x = word;
+  if (shifted_) {
+    if (turned_) x.head<3>() = program_.linear * word.head<3>();
+    x += program_.shift;
+  }
   if (g68_angle != 0) {
     x.head<2>() -= g68_centre;
     turn(x, g68_angle);
@@ -48,7 +52,16 @@ Coordinates WorkCoordinates::to_words(const Coordinates& frame) const {
     turn(x, -g68_angle);
     x.head<2>() += g68_centre;
   }
+  if (shifted_) {
+    x -= program_.shift;
+    if (turned_) x.head<3>() = program_.linear.inverse() * Vec3(x.head<3>());
+  }
   return x;
+}
+
+Mat3 WorkCoordinates::linear() const {
+  const double angle = g68_angle + (rtcp ? 0 : g5x_.rotation);
+  return Eigen::AngleAxisd(angle, Vec3::UnitZ()).toRotationMatrix() * program_.linear;
 }
 
 }  // namespace vcnc

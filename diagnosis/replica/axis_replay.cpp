@@ -1,8 +1,12 @@
 #include "diagnosis/replica/axis_replay.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/effect_stage.hpp"
 #include "diagnosis/replica/fingerprint.hpp"
+#include "diagnosis/search/parallel.hpp"
 #include "model/drive/axis_drive.hpp"
 #include "model/probe/probe_sensor.hpp"
 
@@ -29,54 +33,199 @@ AxisReplay as_measured(const std::vector<double>& position, std::size_t cycles, 
   return replay;
 }
 
+/// Commands of all axes for the end of a cycle.
+struct Command {
+  AxisVector position, velocity;
+};
+
+class Commands {
+ public:
+  Commands(const Machine& actual, const CommandedMotion& motion) : motion_(motion) {
+    for (std::size_t i = 0; i < kAxisCount; ++i) start_[i] = actual.axes[i].limits.start;
+    start_ = motion.start(start_);
+  }
+  const AxisVector& start() const { return start_; }
+  Command at(std::size_t cycle) const {
+    Command c{start_, {}};
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      if (motion_.position[i].empty()) continue;
+      c.position[i] = motion_.position[i][cycle];
+      c.velocity[i] = motion_.velocity[i][cycle];
+    }
+    return c;
+  }
+
+ private:
+  const CommandedMotion& motion_;
+  AxisVector start_;
+};
+
+/// Replays on any number of lanes with `per_cycle` truths; after_cycle(k) is called after each.
+template <class Real, class F>
+std::vector<AxisReplay> replay_lanes(AxisDriveOf<Real>& drive, std::size_t axis,
+                                     const PerLane<Real, AxisVariant>& variants,
+                                     const CommandedMotion& motion, std::size_t per_cycle,
+                                     F&& after_cycle) {
+  const std::size_t cycles = motion.known.size(), lanes = kLanesOf<Real>;
+  const Commands commands(variants[0].actual, motion);
+  std::vector<std::vector<double>> measured(lanes, std::vector<double>(cycles)), twist = measured,
+                                                                                 force = measured;
+  std::vector<AxisReplay> replays(lanes);
+  for (std::size_t n = 0; n < lanes; ++n) {
+    replays[n].per_cycle = per_cycle;
+    replays[n].truth.resize(cycles * per_cycle, start_position(variants[n].actual, kSeed)[axis]);
+    measured[n][0] = commands.start()[axis];
+  }
+  const double full_force = variants[0].hypothesis.axes[axis].mechanics.force_limit;
+  for (std::size_t k = 1; k < cycles; ++k) {
+    const Command command = commands.at(k);
+    drive.tell_commands(command.position, command.velocity);
+    const AxisCycleOf<Real> cycle =
+        drive.follow({Real(command.position[axis]), Real(command.velocity[axis])});
+    for (std::size_t n = 0; n < lanes; ++n) {
+      measured[n][k] = lane(cycle.measured, n);
+      twist[n][k] = lane(cycle.second, n);
+      force[n][k] = lane(cycle.force, n) * full_force;
+      for (std::size_t j = 0; j < per_cycle; ++j)
+        replays[n].truth[k * per_cycle + j] = lane(cycle.truth[kTruthPerCycle - per_cycle + j], n);
+    }
+    after_cycle(k);
+  }
+  for (std::size_t n = 0; n < lanes; ++n) {
+    replays[n].measured = std::move(measured[n]);
+    replays[n].twist = std::move(twist[n]);
+    replays[n].force = std::move(force[n]);
+  }
+  return replays;
+}
+
+constexpr auto nothing = [](std::size_t) {};
+
+/// f(0), f(1), ... as an array.
+template <class Real, class F>
+auto per_lane(F&& f) {
+  return [&]<std::size_t... n>(std::index_sequence<n...>) {
+    return PerLane<Real, decltype(f(std::size_t{0}))>{f(n)...};
+  }
+  (std::make_index_sequence<kLanesOf<Real>>());
+}
+
+/// Fewer drives than this are stepped one after the other.
+constexpr std::size_t kWorthLanes = 3;
+
 }  // namespace
 
 AxisReplay replay_axis(const Machine& hypothesis, const Machine& actual, std::size_t axis,
                        const CommandedMotion& motion) {
-  const std::size_t cycles = motion.known.size();
   if (motion.told[axis] != CommandedMotion::Told::command)
-    return as_measured(motion.position[axis], cycles, actual.axes[axis].limits.start);
-  AxisReplay replay;
-  std::vector<double> measured(cycles), twist(cycles), force(cycles);
-  replay.truth.resize(cycles * kTruthPerCycle, start_position(actual, kSeed)[axis]);
+    return as_measured(motion.position[axis], motion.known.size(), actual.axes[axis].limits.start);
   AxisDrive drive(hypothesis, axis, kSeed);
-  const double full_force = hypothesis.axes[axis].mechanics.force_limit;
-  const AxisVector start = motion.start([&] {
-    AxisVector q;
-    for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = actual.axes[i].limits.start;
-    return q;
-  }());
-  measured[0] = start[axis];
-  for (std::size_t k = 1; k < cycles; ++k) {
-    AxisVector position = start, velocity{};
-    for (std::size_t i = 0; i < kAxisCount; ++i) {
-      if (motion.position[i].empty()) continue;
-      position[i] = motion.position[i][k];
-      velocity[i] = motion.velocity[i][k];
-    }
-    drive.tell_commands(position, velocity);
-    const AxisCycle cycle = drive.follow({position[axis], velocity[axis]});
-    measured[k] = cycle.measured;
-    twist[k] = cycle.second;
-    force[k] = cycle.force * full_force;
-    std::copy(cycle.truth.begin(), cycle.truth.end(),
-              replay.truth.begin() + static_cast<std::ptrdiff_t>(k * kTruthPerCycle));
+  return std::move(replay_lanes<double>(drive, axis, {AxisVariant{hypothesis, actual}}, motion,
+                                        kTruthPerCycle, nothing)[0]);
+}
+
+WatchedReplay replay_watched(const Machine& hypothesis, const Machine& actual, std::size_t axis,
+                             const CommandedMotion& motion) {
+  WatchedReplay watched;
+  if (motion.told[axis] != CommandedMotion::Told::command) {
+    watched.replay = replay_axis(hypothesis, actual, axis, motion);
+    return watched;
   }
-  replay.measured = std::move(measured);
-  replay.twist = std::move(twist);
-  replay.force = std::move(force);
+  AxisDrive drive(hypothesis, axis, kSeed);
+  std::array<LoadMotion, kDriveLoopSteps> load;
+  drive.watch(load);
+  watched.late.resize(motion.known.size() * kLateTruth);
+  watched.replay = std::move(replay_lanes<double>(
+      drive, axis, {AxisVariant{hypothesis, actual}}, motion, kLateTruth, [&](std::size_t k) {
+        std::copy_n(load.end() - kLateTruth, kLateTruth,
+                    watched.late.begin() + static_cast<std::ptrdiff_t>(k * kLateTruth));
+      })[0]);
+  return watched;
+}
+
+std::optional<AxisReplay> displaced(const WatchedReplay& drive, const Machine& hypothesis,
+                                    const Machine& actual, std::size_t axis) {
+  const bool laws = std::any_of(
+      hypothesis.effects.laws.begin(), hypothesis.effects.laws.end(), [&](const Law& law) {
+        return law.axis_index() == axis && law.point == Law::Point::displacement;
+      });
+  Chain<DisplacementPort> chain = axis_chain<DisplacementPort>(hypothesis.effects, axis, kSeed);
+  if (laws || drive.late.empty() || chain.remembers()) return std::nullopt;
+  AxisReplay replay = drive.replay;
+  std::fill_n(replay.truth.begin(), kLateTruth, start_position(actual, kSeed)[axis]);
+  for (std::size_t s = kLateTruth; s < drive.late.size(); ++s) {
+    const LoadMotion& load = drive.late[s];
+    const std::size_t cycle = s / kLateTruth - 1, after = s % kLateTruth + 1;  // from 1 ms on
+    const auto count =
+        static_cast<std::int64_t>(cycle * kTruthPerCycle + kTruthPerCycle - kLateTruth + after);
+    DisplacementPort::Signal<double> signal;
+    chain.step(signal,
+               {.moment = {static_cast<double>(count) * kDriveLoopTime, kDriveLoopTime, count},
+                .load = load.load,
+                .force = load.force,
+                .axes = nullptr});
+    replay.truth[s] = load.load.position + signal.displacement;
+  }
   return replay;
 }
 
-std::string fingerprint_of_axis(const Machine& hypothesis, const Machine& actual,
-                                std::size_t axis) {
-  Fingerprint print;
+std::vector<AxisReplay> replay_variants(const std::vector<AxisVariant>& variants, std::size_t axis,
+                                        const CommandedMotion& motion) {
+  std::vector<AxisReplay> replays(variants.size());
+  if (motion.told[axis] != CommandedMotion::Told::command) {
+    for (std::size_t i = 0; i < variants.size(); ++i)
+      replays[i] = replay_axis(variants[i].hypothesis, variants[i].actual, axis, motion);
+    return replays;
+  }
+  std::vector<std::size_t> left;
+  std::vector<AxisDrive> drives;
+  for (std::size_t i = 0; i < variants.size(); ++i) {
+    left.push_back(i);
+    drives.emplace_back(variants[i].hypothesis, axis, kSeed);
+  }
+  std::vector<std::vector<std::size_t>> groups;
+  while (!left.empty()) {
+    std::vector<std::size_t>& group = groups.emplace_back();
+    std::vector<std::size_t> rest;
+    for (const std::size_t i : left) {
+      const bool alone = group.empty();
+      const bool joins = alone || (group.size() < kLanes && drives[i].suits(drives[group.front()]));
+      (joins ? group : rest).push_back(i);
+    }
+    left = std::move(rest);
+  }
+  parallel_for(groups.size(), [&](std::size_t g) {
+    const std::vector<std::size_t>& group = groups[g];
+    if (group.size() < kWorthLanes) {
+      for (const std::size_t i : group)
+        replays[i] = replay_axis(variants[i].hypothesis, variants[i].actual, axis, motion);
+      return;
+    }
+    std::vector<AxisDrive> together;
+    for (const std::size_t i : group) together.push_back(std::move(drives[i]));
+    AxisDriveLanes drive(std::move(together));
+    drive.skip_early_truth(kTruthPerCycle - kLateTruth);
+    std::vector<AxisReplay> lanes =
+        replay_lanes<Lanes>(drive, axis, per_lane<Lanes>([&](std::size_t n) {
+                              return variants[group[std::min(n, group.size() - 1)]];
+                            }),
+                            motion, kLateTruth, nothing);
+    for (std::size_t n = 0; n < group.size(); ++n) replays[group[n]] = std::move(lanes[n]);
+  });
+  return replays;
+}
+
+AxisFingerprint fingerprint_of_axis(const Machine& hypothesis, const Machine& actual,
+                                    std::size_t axis) {
+  Fingerprint drive, displacement;
   const bool rotary = is_rotary(axis);
-  AxisParams::fields(hypothesis.axes[axis], print, rotary);
-  AxisParams::fields(actual.axes[axis], print, rotary);
+  AxisParams::fields(hypothesis.axes[axis], drive, rotary);
+  AxisParams::fields(actual.axes[axis], drive, rotary);
   for_each_effect_of(actual.effects, [&]<class Effect>(const Effect& effect, std::size_t of) {
     if (of != axis || stage_of<typename Effect::Port>() != EffectStage::drive || effect.null())
       return;
+    Fingerprint& print =
+        std::is_same_v<typename Effect::Port, DisplacementPort> ? displacement : drive;
     for (const char c : Effect::text.name) print.add(c);
     if constexpr (Effect::place == Place::axis)
       Effect::fields(effect, print, rotary);
@@ -84,8 +233,9 @@ std::string fingerprint_of_axis(const Machine& hypothesis, const Machine& actual
       Effect::fields(effect, print);
   });
   for (const Law& law : actual.effects.laws)
-    if (law.axis_index() == axis && law.point != Law::Point::reading) Law::fields(law, print);
-  return print.bytes();
+    if (law.axis_index() == axis && law.point != Law::Point::reading)
+      Law::fields(law, law.point == Law::Point::displacement ? displacement : drive);
+  return {drive.bytes(), displacement.bytes()};
 }
 
 }  // namespace vcnc

@@ -3,17 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <list>
+#include <map>
 #include <stdexcept>
 
 #include "diagnosis/replica/effect_stage.hpp"
 #include "diagnosis/search/candidate.hpp"
+#include "diagnosis/search/parallel.hpp"
 
 namespace vcnc {
 
 namespace {
 
 constexpr double kCycleTime = 1e-3;  // [s]
-constexpr std::size_t kAxisReplays = 6, kBalls = 8;
+constexpr std::size_t kAxisReplays = 6, kWatched = 1, kPoses = 4, kBalls = 8;
 
 /// The commands at 1 ms.
 CommandedMotion at_cycles(const CommandedMotion& motion, double period) {
@@ -68,6 +70,16 @@ class MachineReplica::Memory {
 
   void clear() { kept_.clear(); }
 
+  /// What is kept under `print`; null: nothing.
+  std::shared_ptr<const T> find(const std::string& print) {
+    const std::lock_guard lock(mutex_);
+    const auto found = std::find_if(kept_.begin(), kept_.end(),
+                                    [&](const auto& entry) { return entry.first == print; });
+    if (found == kept_.end()) return nullptr;
+    kept_.splice(kept_.begin(), kept_, found);
+    return kept_.front().second;
+  }
+
   /// What is kept under `print`, or what `make` makes of it now.
   template <class Make>
   std::shared_ptr<const T> find_or_make(const std::string& print, Make&& make) {
@@ -80,15 +92,6 @@ class MachineReplica::Memory {
   }
 
  private:
-  std::shared_ptr<const T> find(const std::string& print) {
-    const std::lock_guard lock(mutex_);
-    const auto found = std::find_if(kept_.begin(), kept_.end(),
-                                    [&](const auto& entry) { return entry.first == print; });
-    if (found == kept_.end()) return nullptr;
-    kept_.splice(kept_.begin(), kept_, found);
-    return kept_.front().second;
-  }
-
   std::size_t capacity_;
   std::mutex mutex_;
   std::list<std::pair<std::string, std::shared_ptr<const T>>> kept_;  ///< last used first
@@ -96,10 +99,10 @@ class MachineReplica::Memory {
 
 /// A machine as the replica takes it.
 struct MachineReplica::Hypothesis {
-  Machine machine;            ///< without chance, starting where the record does
-  Machine actual;             ///< with its deviations applied
-  PerAxis<std::string> axis;  ///< fingerprints
-  std::string contact;        ///< without the axes
+  Machine machine;                   ///< without chance, starting where the record does
+  Machine actual;                    ///< with its deviations applied
+  PerAxis<std::string> drive, axis;  ///< fingerprints, without and with displacements
+  std::string contact;               ///< without the axes
   std::string ball, sensing;
 };
 
@@ -127,6 +130,8 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
   motion_ = at_cycles(motion, period_);
   if (piece) piece_ = make_piece(*piece);
   for (auto& memory : axis_memory_) memory = std::make_unique<Memory<AxisReplay>>(kAxisReplays);
+  for (auto& memory : watched_) memory = std::make_unique<Memory<WatchedReplay>>(kWatched);
+  pose_memory_ = std::make_unique<Memory<Poses>>(kPoses);
   ball_memory_ = std::make_unique<Memory<Deflections>>(kBalls);
   anchor(declared);
 }
@@ -146,7 +151,9 @@ MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine)
           motion_.position[axis].front();
   h.ball = h.contact = fingerprint_of_contact(h.actual);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    h.axis[axis] = fingerprint_of_axis(h.machine, h.actual, axis);
+    const AxisFingerprint print = fingerprint_of_axis(h.machine, h.actual, axis);
+    h.drive[axis] = print.drive;
+    h.axis[axis] = print.drive + "|" + print.displacement;
     h.ball += h.axis[axis];
   }
   h.sensing = fingerprint_of_sensing(h.actual);
@@ -164,17 +171,31 @@ AxisReplays MachineReplica::axes_of(const Hypothesis& h) const {
 /// With its signals at the record's samples.
 AxisReplay MachineReplica::replayed(const Hypothesis& h, std::size_t axis) const {
   AxisReplay replay = replay_axis(h.machine, h.actual, axis, motion_);
-  for (SharedSeries* s : {&replay.measured, &replay.twist, &replay.force}) *s = as_recorded(*s);
+  sample_as_recorded(replay);
   return replay;
+}
+
+void MachineReplica::sample_as_recorded(AxisReplay& replay) const {
+  for (SharedSeries* s : {&replay.measured, &replay.twist, &replay.force}) *s = as_recorded(*s);
+}
+
+/// On the anchor's axes.
+std::shared_ptr<const Poses> MachineReplica::poses_of(const Hypothesis& h) const {
+  if (h.contact == anchor_->contact) return {std::shared_ptr<void>(), &anchor_->poses.poses()};
+  return pose_memory_->find_or_make(h.contact,
+                                    [&] { return replay_poses(h.actual, anchor_->poses.axes()); });
 }
 
 /// Quickly.
 std::shared_ptr<const Deflections> MachineReplica::ball_of(const Hypothesis& h,
                                                            const AxisReplays& axes) const {
   return ball_memory_->find_or_make(h.ball, [&] {
-    const bool same = h.contact == anchor_->contact;
-    return replay_contact(h.actual, piece_.get(),
-                          same ? anchor_->poses.at(axes) : replay_poses(h.actual, axes));
+    if (h.contact != anchor_->contact && poses_follow_dynamics(h.actual)) {
+      const Poses poses = replay_poses(h.actual, axes);
+      return replay_contact(h.actual, piece_.get(), {anchor_->poses, poses, anchor_->poses.axes()});
+    }
+    const auto poses = poses_of(h);
+    return replay_contact(h.actual, piece_.get(), {anchor_->poses, *poses, axes});
   });
 }
 
@@ -185,12 +206,14 @@ void MachineReplica::anchor(const Machine& machine) {
   auto anchor = std::make_unique<Anchor>(h, axes);
   anchor->needs_full = needs_full_probe(h.actual);
   anchor->full = replay_probe(h.actual, piece_.get(), axes);
-  const Deflections quick = replay_contact(h.actual, piece_.get(), anchor->poses.poses());
+  const Deflections quick = replay_contact(
+      h.actual, piece_.get(), {anchor->poses, anchor->poses.poses(), anchor->poses.axes()});
   anchor->ball_offset = sum(anchor->full.ball, quick, -1);
   anchor->reading_offset =
       sum(anchor->full.reading, replay_sensing(h.actual, anchor->full.ball, axes), -1);
   anchor_ = std::move(anchor);
-  ball_memory_->clear();  // it holds what was seen from another anchor
+  pose_memory_->clear();  // they hold what was seen from another anchor
+  ball_memory_->clear();
 }
 
 Deflections MachineReplica::reading_of(const Hypothesis& h, const AxisReplays& axes) const {
@@ -242,8 +265,66 @@ Prediction MachineReplica::assembled(const AxisReplays& axes, const Deflections&
 
 Prediction MachineReplica::predict(const Machine& machine) const {
   const Hypothesis h = hypothesis_of(machine);
-  const AxisReplays axes = axes_of(h);
+  return predict(h, axes_of(h));
+}
+
+Prediction MachineReplica::predict(const Hypothesis& h, const AxisReplays& axes) const {
   return assembled(axes, probes_ ? reading_of(h, axes) : Deflections{});
+}
+
+std::vector<Prediction> MachineReplica::predict_all(const std::vector<Machine>& machines) const {
+  if (machines.size() == 1) return {predict(machines.front())};
+  std::vector<Hypothesis> all(machines.size());
+  parallel_for(all.size(), [&](std::size_t i) { all[i] = hypothesis_of(machines[i]); });
+  std::vector<AxisReplays> axes(all.size());
+  parallel_for(kAxisCount, [&](std::size_t axis) {
+    std::map<std::string, std::vector<std::size_t>> alike;  // indices by drive, not known yet
+    std::map<std::string, std::shared_ptr<const AxisReplay>> made;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const Hypothesis& h = all[i];
+      // The probe in full asks for the whole truth.
+      const bool in_full = probes_ && (anchor_->needs_full || needs_full_probe(h.actual));
+      axes[i][axis] = in_full ? axis_memory_[axis]->find_or_make(h.axis[axis],
+                                                                 [&] { return replayed(h, axis); })
+                              : axis_memory_[axis]->find(h.axis[axis]);
+      if (!axes[i][axis] && made.try_emplace(h.axis[axis]).second)
+        alike[h.drive[axis]].push_back(i);
+    }
+    std::vector<std::size_t> left;
+    for (const auto& [print, group] : alike) {
+      const Hypothesis& first = all[group.front()];
+      auto watched = watched_[axis]->find(print);
+      if (!watched && group.size() > 1)
+        watched = watched_[axis]->find_or_make(print, [&] {
+          WatchedReplay w = replay_watched(first.machine, first.actual, axis, motion_);
+          sample_as_recorded(w.replay);
+          return w;
+        });
+      for (const std::size_t i : group) {
+        auto replay =
+            watched ? displaced(*watched, all[i].machine, all[i].actual, axis) : std::nullopt;
+        if (replay)
+          made[all[i].axis[axis]] = std::make_shared<const AxisReplay>(std::move(*replay));
+        else
+          left.push_back(i);
+      }
+    }
+    std::vector<AxisVariant> variants;
+    for (const std::size_t i : left) variants.push_back({all[i].machine, all[i].actual});
+    std::vector<AxisReplay> replays = replay_variants(variants, axis, motion_);
+    for (std::size_t n = 0; n < left.size(); ++n) {
+      sample_as_recorded(replays[n]);
+      made[all[left[n]].axis[axis]] = std::make_shared<const AxisReplay>(std::move(replays[n]));
+    }
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (!axes[i][axis]) axes[i][axis] = made.at(all[i].axis[axis]);
+  });
+  std::vector<Prediction> predictions(all.size());
+  parallel_for(all.size(), [&](std::size_t i) {
+    predictions[i] = predict(all[i], axes[i]);
+    axes[i] = {};
+  });
+  return predictions;
 }
 
 Prediction MachineReplica::predict_in_full(const Machine& machine) const {

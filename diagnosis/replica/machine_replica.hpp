@@ -10,13 +10,16 @@
 // the spline of the commands and back by straight lines.
 //
 // What has been computed is kept and found again by what it depends on: changing something of X
-// does not simulate Y, changing the probe simulates no axis. The results are the same as without.
+// does not simulate Y, changing the probe simulates no axis, and what only displaces the tool
+// centre does not simulate the drive. The results are the same as without. Several machines at a
+// time have the variants of their axes stepped side by side, to the same bits.
 //
 // Axes are always simulated in full. The probe is, for one machine, the anchor: the declared one
 // until another is chosen. Of any other machine only the difference from the anchor is computed, in
 // steps of 1 ms (probe_replay.hpp): first of the true deflection, then of what is read of it,
-// value = full(anchor) + quick(machine) - quick(anchor). So it is exact at the anchor, and the
-// nearer the better. What cannot be had quickly is computed in full.
+// value = full(anchor) + quick(machine) - quick(anchor). Poses are those on the anchor's axes,
+// moved along with the axes to first order. So it is exact at the anchor, and the nearer the
+// better. What cannot be had quickly is computed in full.
 #pragma once
 
 #include <map>
@@ -45,6 +48,8 @@ class MachineReplica : public Replica {
 
   const std::vector<ComparedChannel>& channels() const override { return channels_; }
   Prediction predict(const Machine& hypothesis) const override;
+  /// Axes of several machines are stepped side by side.
+  std::vector<Prediction> predict_all(const std::vector<Machine>& hypotheses) const override;
   /// The same with the probe in full, too, and without the memory of earlier predictions.
   Prediction predict_in_full(const Machine& hypothesis) const;
 
@@ -60,10 +65,13 @@ class MachineReplica : public Replica {
   struct Anchor;
   Hypothesis hypothesis_of(const Machine& machine) const;
   AxisReplays axes_of(const Hypothesis& hypothesis) const;
+  std::shared_ptr<const Poses> poses_of(const Hypothesis& hypothesis) const;
   std::shared_ptr<const Deflections> ball_of(const Hypothesis& hypothesis,
                                              const AxisReplays& axes) const;
   Deflections reading_of(const Hypothesis& hypothesis, const AxisReplays& axes) const;
   AxisReplay replayed(const Hypothesis& hypothesis, std::size_t axis) const;
+  void sample_as_recorded(AxisReplay& replay) const;
+  Prediction predict(const Hypothesis& hypothesis, const AxisReplays& axes) const;
   Prediction assembled(const AxisReplays& axes, const Deflections& reading) const;
   std::vector<double> as_recorded(const std::vector<double>& per_cycle) const;
 
@@ -76,6 +84,8 @@ class MachineReplica : public Replica {
   std::vector<char> known_;  ///< at the record's rate
   std::unique_ptr<Piece> piece_;
   PerAxis<std::unique_ptr<Memory<AxisReplay>>> axis_memory_;
+  PerAxis<std::unique_ptr<Memory<WatchedReplay>>> watched_;
+  std::unique_ptr<Memory<Poses>> pose_memory_;  ///< on the anchor's axes
   std::unique_ptr<Memory<Deflections>> ball_memory_;
   std::unique_ptr<const Anchor> anchor_;  ///< null where nothing is probed
 };

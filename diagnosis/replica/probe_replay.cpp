@@ -20,9 +20,8 @@ Moment moment_of(std::size_t cycle) {
 
 /// True motion of the axes at the end of a cycle, as the probe module finds it from its samples.
 void read_motions(const AxisReplays& axes, std::size_t cycle, Motions<double>& motions) {
-  const std::size_t s = (cycle + 1) * kTruthPerCycle - 1;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const double* const x = &axes[i]->truth[s];
+    const double* const x = axes[i]->end_of(cycle);
     if (cycle == 0) {
       motions[i] = {x[0], 0, 0};
       continue;
@@ -34,7 +33,7 @@ void read_motions(const AxisReplays& axes, std::size_t cycle, Motions<double>& m
 
 /// Of one axis at the end of a cycle.
 double position_at(const AxisReplays& axes, std::size_t axis, std::size_t cycle) {
-  return axes[axis]->truth[(cycle + 1) * kTruthPerCycle - 1];
+  return *axes[axis]->end_of(cycle);
 }
 
 AxisVector positions(const Motions<double>& motions) {
@@ -170,7 +169,7 @@ ProbeReplay replay_probe(const Machine& actual, const Piece* piece, const AxisRe
 }
 
 Poses replay_poses(const Machine& actual, const AxisReplays& axes) {
-  const std::size_t cycles = axes[0]->truth.size() / kTruthPerCycle;
+  const std::size_t cycles = axes[0]->cycles();
   Poses poses(cycles);
   const Kinematics kinematics(actual.kinematics, actual.probe.length, actual.setup.work_offset[0]);
   Chain<PosePort> errors = machine_chain<PosePort>(actual.effects, kSeed);
@@ -208,23 +207,29 @@ NearbyPoses::NearbyPoses(const Machine& actual, const AxisReplays& axes)
   }
 }
 
-Poses NearbyPoses::at(const AxisReplays& axes) const {
-  Poses moved = poses_;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    if (axes[i] == axes_[i]) continue;
-    for (std::size_t k = 0; k < moved.size(); ++k) {
-      const double dq = position_at(axes, i, k) - position_at(axes_, i, k);
-      moved[k].p_WT += changes_[k].J.col(static_cast<Eigen::Index>(i)) * dq;
-      if (!is_rotary(i)) continue;
-      const Vec3 turn = (i == kA ? changes_[k].w_A : changes_[k].w_C) * dq;
-      for (Eigen::Index c = 0; c < 3; ++c)
-        moved[k].R_WT.col(c) += turn.cross(poses_[k].R_WT.col(c));
-    }
-  }
-  return moved;
+NearbyPoses::Course::Course(const NearbyPoses& near, const Poses& poses, const AxisReplays& axes)
+    : near_(near), poses_(poses), axes_(axes) {
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (axes[i] != near.axes_[i]) moved_.push_back(i);
 }
 
-Deflections replay_contact(const Machine& actual, const Piece* piece, const Poses& poses) {
+const ToolPose& NearbyPoses::Course::operator[](std::size_t k) {
+  const ToolPose& here = poses_[k];
+  if (moved_.empty()) return here;
+  const Change& change = near_.changes_[k];
+  pose_ = here;
+  for (const std::size_t i : moved_) {
+    const double dq = position_at(axes_, i, k) - position_at(near_.axes_, i, k);
+    if (dq == 0) continue;
+    pose_.p_WT += change.J.col(static_cast<Eigen::Index>(i)) * dq;
+    if (!is_rotary(i)) continue;
+    const Vec3 turn = (i == kA ? change.w_A : change.w_C) * dq;
+    for (Eigen::Index c = 0; c < 3; ++c) pose_.R_WT.col(c) += turn.cross(here.R_WT.col(c));
+  }
+  return pose_;
+}
+
+Deflections replay_contact(const Machine& actual, const Piece* piece, NearbyPoses::Course poses) {
   Deflections ball;
   for (std::vector<double>& b : ball) b.resize(poses.size());
   CoarseContact contact(actual, piece);
@@ -274,6 +279,11 @@ bool needs_full_probe(const Machine& actual) {
   return !actual.effects.get<ContactLoss>().null() || !actual.effects.get<ReturnToZero>().null() ||
          (actual.probe.correction == ProbeParams::Correction::heydemann &&
           !machine_chain<AnaloguePort>(actual.effects, kSeed).empty());
+}
+
+bool poses_follow_dynamics(const Machine& actual) {
+  return !actual.effects.get<CrossInertia>().null() ||
+         machine_chain<PosePort>(actual.effects, kSeed).remembers();
 }
 
 std::string fingerprint_of_contact(const Machine& actual) {

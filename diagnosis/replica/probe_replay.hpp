@@ -57,8 +57,25 @@ class NearbyPoses {
  public:
   NearbyPoses(const Machine& actual, const AxisReplays& axes);
 
+  const AxisReplays& axes() const { return axes_; }
+  /// Of the machine itself.
   const Poses& poses() const { return poses_; }
-  Poses at(const AxisReplays& axes) const;
+
+  /// Poses of a similar machine on other axes, of which those on the axes of this one are `poses`.
+  class Course {
+   public:
+    Course(const NearbyPoses& near, const Poses& poses, const AxisReplays& axes);
+    std::size_t size() const { return poses_.size(); }
+    /// Of one cycle, until the next one is asked for.
+    const ToolPose& operator[](std::size_t cycle);
+
+   private:
+    const NearbyPoses& near_;
+    const Poses& poses_;
+    const AxisReplays& axes_;
+    std::vector<std::size_t> moved_;  ///< axes that move otherwise
+    ToolPose pose_;
+  };
 
  private:
   struct Change {
@@ -71,7 +88,7 @@ class NearbyPoses {
 };
 
 /// Quickly: the true deflection of the ball.
-Deflections replay_contact(const Machine& actual, const Piece* piece, const Poses& poses);
+Deflections replay_contact(const Machine& actual, const Piece* piece, NearbyPoses::Course poses);
 /// Quickly: what the probe says of it.
 Deflections replay_sensing(const Machine& actual, const Deflections& ball, const AxisReplays& axes);
 
@@ -79,6 +96,10 @@ Deflections replay_sensing(const Machine& actual, const Deflections& ball, const
 /// friction depends on the sliding within a cycle, and effects on signals that are corrected
 /// online.
 bool needs_full_probe(const Machine& actual);
+
+/// Whether errors of the geometry follow the axes' accelerations, or remember: then those near
+/// other axes are not those of a machine near.
+bool poses_follow_dynamics(const Machine& actual);
 
 /// What replay_contact() and replay_sensing() depend on besides the axes.
 std::string fingerprint_of_contact(const Machine& actual);

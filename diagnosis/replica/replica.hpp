@@ -52,6 +52,12 @@ class Replica {
   /// One series per channel, as long as the record; NaN where it says nothing. Deterministic; may
   /// be called from several threads.
   virtual Prediction predict(const Machine& hypothesis) const = 0;
+  /// The same of several machines, which may be quicker than one after the other.
+  virtual std::vector<Prediction> predict_all(const std::vector<Machine>& hypotheses) const {
+    std::vector<Prediction> all;
+    for (const Machine& h : hypotheses) all.push_back(predict(h));
+    return all;
+  }
   /// What follows is asked about machines near this one: a replica may be exact here and quicker
   /// elsewhere. Not while others predict.
   virtual void anchor(const Machine&) {}

@@ -3,18 +3,93 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/search/evidence.hpp"
+#include "diagnosis/search/freed_number.hpp"
+#include "diagnosis/search/selection.hpp"
+
 namespace vcnc {
 namespace {
 
 /// Lengths of laps of one condition differ by their start within a sample.
 constexpr std::size_t kSlack = 3;
+/// A reading is not told where it is off by more than this, of its roughness.
+constexpr double kUntold = 20;
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Standard deviation of what is not smooth in a signal: of second differences, by their median.
+double roughness(const std::vector<double>& value) {
+  std::vector<double> second;
+  for (std::size_t k = 2; k < value.size(); ++k)
+    if (const double d = std::abs(value[k] - 2 * value[k - 1] + value[k - 2]); std::isfinite(d))
+      second.push_back(d);
+  return second.empty() ? 0 : 1.4826 * median(std::move(second)) / std::sqrt(6.0);
+}
+
+/// RMS of what the healthy machine is off the healthy run where it is told, per channel.
+PerAxis<double> leave_out_untold(Record& difference, const Record& now) {
+  PerAxis<double> off{};
+  for (MeasuredSignal& signal : difference.signals) {
+    if (signal.kind != SignalKind::deflection) continue;
+    const std::vector<double>& measured = now.find(signal.kind, signal.axis)->value;
+    const double most = kUntold * std::max(roughness(measured), signal.resolution);
+    if (most <= 0) continue;
+    double sum = 0, n = 0;
+    for (std::size_t k = 0; k < measured.size(); ++k) {
+      const double d = measured[k] - signal.value[k];
+      if (std::abs(d) > most) signal.value[k] = kMissing;
+      if (std::abs(d) <= most) sum += d * d, n += 1;
+    }
+    off[signal.axis] = n > 0 ? std::sqrt(sum / n) : 0;
+  }
+  return off;
+}
+
+/// Without readings that are off by far more than most: moments of touching tell nothing of where
+/// the piece is.
+Record without_outliers(Record record, const Replica& replica, const Machine& declared) {
+  constexpr double kFarOff = 5;  // times the median
+  const Prediction predicted = replica.predict(declared);
+  for (std::size_t c = 0; c < predicted.size(); ++c) {
+    const ComparedChannel& channel = replica.channels()[c];
+    if (channel.kind != SignalKind::deflection) continue;
+    for (MeasuredSignal& signal : record.signals) {
+      if (signal.kind != channel.kind || signal.axis != channel.axis) continue;
+      std::vector<double> off(signal.value.size()), known;
+      for (std::size_t k = 0; k < off.size(); ++k) {
+        off[k] = std::abs(signal.value[k] - predicted[c][k]);
+        if (std::isfinite(off[k])) known.push_back(off[k]);
+      }
+      if (known.empty()) continue;
+      const double most =
+          std::max(kFarOff * median(std::move(known)), kUntold * roughness(signal.value));
+      for (std::size_t k = 0; k < off.size(); ++k)
+        if (off[k] > most) signal.value[k] = kMissing;
+    }
+  }
+  return record;
+}
+
+/// The declared machine with the piece where it was clamped for a run.
+Machine as_clamped(const Record& run, Replica& replica, const Machine& declared) {
+  const Record record = without_outliers(run, replica, declared);
+  Evidence evidence(record, replica, declared);
+  std::vector<FreedNumber> clamping = nuisances(declared);
+  std::erase_if(clamping,
+                [](const FreedNumber& n) { return !n.number.key.starts_with("effects.setup."); });
+  return fit_numbers(evidence, declared, std::move(clamping)).machine;
+}
 
 }  // namespace
 
-DifferentialRecord less_healthy(const Record& now, const Record& healthy, const Replica& of_healthy,
+DifferentialRecord less_healthy(const Record& now, const Record& healthy, Replica& of_healthy,
                                 const Machine& declared) {
-  DifferentialRecord result{now, 1};
-  const Prediction predicted = of_healthy.predict(declared);
+  DifferentialRecord result{now, 1, {}, as_clamped(healthy, of_healthy, declared)};
+  const Prediction predicted = of_healthy.predict(result.healthy);
   const std::vector<ComparedChannel>& channels = of_healthy.channels();
   std::size_t fewest = 0, unmatched = 0;
   for (MeasuredSignal& signal : result.record.signals) {
@@ -52,6 +127,7 @@ DifferentialRecord less_healthy(const Record& now, const Record& healthy, const 
     result.record.warnings.push_back(
         "Some motions have no partner in the reference run and are left out: was it the same "
         "program?");
+  result.off = leave_out_untold(result.record, now);
   if (fewest > 0) result.noise_scale = std::sqrt(1 + 1 / static_cast<double>(fewest));
   return result;
 }

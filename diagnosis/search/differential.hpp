@@ -1,23 +1,31 @@
 // A record less what a healthy run of the same program has besides its declared machine.
 //
-//   y := y_now - mean over laps of (y_ref - yhat_ref(declared))
+//   y := y_now - mean over laps of (y_ref - yhat_ref(healthy))
 //
-// so that what the model gets wrong about the healthy machine cancels to first order. Laps are
-// matched by condition; samples without a partner become missing. The noise of the reference stays
-// in: variances grow by 1 + 1/n for n laps.
+// so that what the model gets wrong about the healthy machine cancels to first order. `healthy` is
+// the declared machine with the piece where it was clamped for the healthy run, which is fitted
+// first: what a change does to a reading depends on where the ball touches. Laps are matched by
+// condition; samples without a partner become missing, and so do readings of the probe where the
+// healthy machine is off the healthy run by 20 times their roughness, as in the moment of touching
+// or while the drag on the ball turns over: there the model does not tell what a change does
+// either. The noise of the reference stays in: variances grow by 1 + 1/n for n laps.
 #pragma once
 
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
+#include "model/axes.hpp"
+#include "model/machine.hpp"
 
 namespace vcnc {
 
 struct DifferentialRecord {
   Record record;
   double noise_scale = 1;  ///< of the standard deviation
+  PerAxis<double> off{};  ///< RMS of a reading of the probe less yhat in the healthy run, x y z [m]
+  Machine healthy;        ///< what the record is held against instead of the declared machine
 };
 
-DifferentialRecord less_healthy(const Record& now, const Record& healthy, const Replica& of_healthy,
+DifferentialRecord less_healthy(const Record& now, const Record& healthy, Replica& of_healthy,
                                 const Machine& declared);
 
 }  // namespace vcnc

@@ -1,5 +1,6 @@
 #include "diagnosis/search/evidence.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -32,9 +33,24 @@ bool Column::zero() const {
   return true;
 }
 
+Column less(const Column& z, const std::vector<Column>& columns, const Eigen::VectorXd& step) {
+  Column::Channels left(z.size());
+  for (std::size_t c = 0; c < z.size(); ++c) {
+    left[c] = z[c];
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      const std::vector<float>& column = columns[i][c];
+      if (column.empty()) continue;
+      left[c].resize(column.size(), 0.0F);
+      const auto s = static_cast<float>(step[static_cast<Eigen::Index>(i)]);
+      for (std::size_t k = 0; k < column.size(); ++k) left[c][k] -= s * column[k];
+    }
+  }
+  return left;
+}
+
 Evidence::Evidence(const Record& record, Replica& replica, const Machine& declared,
                    double noise_scale)
-    : record_(record), replica_(replica), partition_(vcnc::partition(record)) {
+    : record_(record), replica_(replica), gathering_(replica), partition_(vcnc::partition(record)) {
   const std::vector<ComparedChannel>& channels = replica.channels();
   declared_ = replica.predict(declared);
   for (std::size_t c = 0; c < channels.size(); ++c) {
@@ -88,17 +104,35 @@ void Evidence::mask_standing() {
 }
 
 Prediction Evidence::predict(const Machine& hypothesis) const {
-  return replica_.predict(hypothesis);
+  return std::move(predict_all({hypothesis})[0]);
+}
+
+std::vector<Prediction> Evidence::predict_all(const std::vector<Machine>& hypotheses) const {
+  return gathering_.predict_all(hypotheses);
 }
 
 std::vector<float> Evidence::whiten(std::size_t channel, const std::vector<double>& series) const {
+  constexpr std::size_t kAtATime = 256;
   const WhiteningFilter& filter = noise_.channels[channel].filter;
+  const std::vector<char>& valid = valid_[channel];
+  const double per_scale = 1 / filter.scale;
   std::vector<float> z(series.size(), 0.0F);
-  for (std::size_t k = 0; k < series.size(); ++k) {
-    if (!valid_[channel][k]) continue;
-    double v = series[k];
-    for (std::size_t j = 0; j < filter.a.size(); ++j) v -= filter.a[j] * series[k - 1 - j];
-    z[k] = static_cast<float>(v / filter.scale);
+  double v[kAtATime];
+  for (std::size_t k = 0; k < series.size();) {
+    if (!valid[k]) {
+      ++k;
+      continue;
+    }
+    std::size_t n = 1;
+    while (n < kAtATime && k + n < series.size() && valid[k + n]) ++n;
+    std::copy_n(&series[k], n, v);
+    for (std::size_t j = 0; j < filter.a.size(); ++j) {
+      const double a = filter.a[j];
+      const double* const before = &series[k - 1 - j];
+      for (std::size_t i = 0; i < n; ++i) v[i] -= a * before[i];
+    }
+    for (std::size_t i = 0; i < n; ++i) z[k + i] = static_cast<float>(v[i] * per_scale);
+    k += n;
   }
   return z;
 }
@@ -119,28 +153,34 @@ Column Evidence::residual(const Prediction& prediction) const {
 }
 
 Column Evidence::sensitivity(const Prediction& base, const Prediction& changed, double step) const {
-  SeriesOfChannels change(base.size());
+  Column::Channels column(base.size());
+  std::vector<double> change;
   for (std::size_t c = 0; c < base.size(); ++c) {
     if (changed[c].shares(base[c])) continue;
     const std::vector<double>&after = changed[c], &before = base[c];
-    change[c].resize(before.size());
-    for (std::size_t k = 0; k < before.size(); ++k) change[c][k] = (after[k] - before[k]) / step;
+    change.resize(before.size());
+    for (std::size_t k = 0; k < change.size(); ++k) change[k] = (after[k] - before[k]) / step;
+    if (keep_comparable(c, change)) column[c] = whiten(c, change);
   }
-  return whiten(change);
+  return column;
+}
+
+/// Puts zero where a change cannot be compared; whether anything is left.
+bool Evidence::keep_comparable(std::size_t channel, std::vector<double>& change) const {
+  double any = 0;
+  for (std::size_t k = 0; k < change.size(); ++k) {
+    const double d = change[k];
+    change[k] = raw_valid_[channel][k] && std::isfinite(d) ? d : 0;
+    any = std::max(any, std::abs(change[k]));
+  }
+  return any != 0;
 }
 
 Column Evidence::whiten(const SeriesOfChannels& change) const {
   Column::Channels column(change.size());
   for (std::size_t c = 0; c < change.size(); ++c) {
-    if (change[c].empty()) continue;
-    std::vector<double> d(change[c].size(), 0.0);
-    bool any = false;
-    for (std::size_t k = 0; k < d.size(); ++k) {
-      if (!raw_valid_[c][k] || !std::isfinite(change[c][k])) continue;
-      d[k] = change[c][k];
-      any = any || d[k] != 0;
-    }
-    if (any) column[c] = whiten(c, d);
+    std::vector<double> d = change[c];
+    if (keep_comparable(c, d)) column[c] = whiten(c, d);
   }
   return column;
 }

@@ -18,6 +18,7 @@
 
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
+#include "diagnosis/search/gathering.hpp"
 #include "diagnosis/search/noise_audit.hpp"
 #include "diagnosis/search/partition.hpp"
 
@@ -41,6 +42,9 @@ class Column {
  private:
   std::shared_ptr<const Channels> channels_;
 };
+
+/// z less the sum of step_i columns_i.
+Column less(const Column& z, const std::vector<Column>& columns, const Eigen::VectorXd& step);
 
 /// One series per channel in SI.
 using SeriesOfChannels = std::vector<std::vector<double>>;
@@ -68,6 +72,14 @@ class Evidence {
   const NoiseAudit& noise() const { return noise_; }
 
   Prediction predict(const Machine& hypothesis) const;
+  /// As many at a time as are worth it.
+  static constexpr std::size_t kTogether = 32;
+  std::vector<Prediction> predict_all(const std::vector<Machine>& hypotheses) const;
+  /// Calls f(0) ... f(n - 1) at the same time; what they ask to be predicted is predicted together.
+  template <class F>
+  void each_together(std::size_t n, F&& f) const {
+    gathering_.each(n, std::forward<F>(f));
+  }
   /// See Replica::anchor().
   void anchor(const Machine& machine) { replica_.anchor(machine); }
   /// W (y - yhat).
@@ -97,10 +109,12 @@ class Evidence {
     return role == Role::both || block.held_out == (role == Role::held_out);
   }
   std::vector<float> whiten(std::size_t channel, const std::vector<double>& series) const;
+  bool keep_comparable(std::size_t channel, std::vector<double>& change) const;
   void mask_standing();
 
   const Record& record_;
   Replica& replica_;
+  mutable Gathering gathering_;
   Partition partition_;
   SeriesOfChannels measured_;
   Prediction declared_;

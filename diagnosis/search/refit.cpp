@@ -14,13 +14,43 @@ std::vector<FreedNumber> moved(std::vector<FreedNumber> numbers, const Eigen::Ve
   return numbers;
 }
 
-std::vector<const Column*> pointers(const Column& first, const std::vector<Column>& second,
-                                    const std::vector<Column>& third) {
-  std::vector<const Column*> all{&first};
-  for (const Column& c : second) all.push_back(&c);
-  for (const Column& c : third) all.push_back(&c);
+std::vector<const Column*> pointers(const std::vector<Column>& columns) {
+  std::vector<const Column*> all;
+  for (const Column& c : columns) all.push_back(&c);
   return all;
 }
+
+/// Products of [z, J..., N...] of which those of the N with each other are computed once.
+class Products {
+ public:
+  Products(const Evidence& evidence, const std::vector<Column>& linear)
+      : evidence_(evidence), linear_(pointers(linear)) {
+    if (linear_.empty()) return;
+    const BlockGrams blocks = evidence.grams(linear_);
+    own_ = {evidence.sum(blocks, Role::fitted), evidence.sum(blocks, Role::held_out)};
+  }
+
+  RoleGrams with(const Column& z, const std::vector<Column>& live) const {
+    std::vector<const Column*> first{&z};
+    for (const Column& c : live) first.push_back(&c);
+    const RoleGrams corner = evidence_.cross(first, first), side = evidence_.cross(first, linear_);
+    return {bordered(corner.fitted, side.fitted, own_.fitted),
+            bordered(corner.held_out, side.held_out, own_.held_out)};
+  }
+
+ private:
+  static Eigen::MatrixXd bordered(const Eigen::MatrixXd& a, const Eigen::MatrixXd& cross,
+                                  const Eigen::MatrixXd& b) {
+    if (b.size() == 0) return a;
+    Eigen::MatrixXd all(a.rows() + b.rows(), a.cols() + b.cols());
+    all << a, cross, cross.transpose(), b;
+    return all;
+  }
+
+  const Evidence& evidence_;
+  std::vector<const Column*> linear_;
+  RoleGrams own_;
+};
 
 /// One point of the search, kept so that asking again for its derivatives costs no simulation.
 struct Point {
@@ -115,21 +145,36 @@ LinearStep linear_step(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& hel
   return s;
 }
 
-Column column_of(const Evidence& evidence, const Machine& machine, const Prediction& base,
-                 const FreedNumber& n) {
-  double step = n.shape ? 1e-4 * std::max(std::abs(n.value), 1e-3 * n.number.typical)
-                        : std::clamp(0.1 * std::abs(n.value), 0.01 * n.number.typical,
-                                     0.1 * n.number.typical);
-  if (n.value + step > n.number.max) step = -step;
-  Machine changed = machine;
-  move_number(changed, n.number.key, n.value + step);
-  return evidence.sensitivity(base, evidence.predict(changed), step / n.number.typical);
+std::vector<Column> columns_of(const Evidence& evidence, const Machine& machine,
+                               const Prediction& base, const std::vector<FreedNumber>& numbers) {
+  std::vector<Column> columns(numbers.size());
+  for (std::size_t first = 0; first < numbers.size(); first += Evidence::kTogether) {
+    const std::size_t last = std::min(first + Evidence::kTogether, numbers.size());
+    std::vector<Machine> changed;
+    std::vector<double> steps;
+    for (std::size_t i = first; i < last; ++i) {
+      const FreedNumber& n = numbers[i];
+      double step = n.shape ? 1e-4 * std::max(std::abs(n.value), 1e-3 * n.number.typical)
+                            : std::clamp(0.1 * std::abs(n.value), 0.01 * n.number.typical,
+                                         0.1 * n.number.typical);
+      if (n.value + step > n.number.max) step = -step;
+      changed.push_back(machine);
+      move_number(changed.back(), n.number.key, n.value + step);
+      steps.push_back(step / n.number.typical);
+    }
+    const std::vector<Prediction> predictions = evidence.predict_all(changed);
+    parallel_for(changed.size(), [&](std::size_t i) {
+      columns[first + i] = evidence.sensitivity(base, predictions[i], steps[i]);
+    });
+  }
+  return columns;
 }
 
 Refit refit(const Evidence& evidence, const Machine& start, const std::vector<FreedNumber>& live,
             const LinearPart& linear, int max_iterations) {
   Refit result;
   const auto k = static_cast<Eigen::Index>(live.size());
+  const Products products(evidence, linear.columns);
   std::vector<Point> points;  // the last one and the best one are asked for again
 
   const auto visit = [&](const Eigen::VectorXd& x, bool derivatives) -> Point& {
@@ -147,10 +192,7 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
     if (derivatives && p->columns.empty() && k > 0) {
       const std::vector<FreedNumber> at = moved(live, x);
       const Machine machine = with(start, at);
-      p->columns.resize(live.size());
-      parallel_for(live.size(), [&](std::size_t i) {
-        p->columns[i] = column_of(evidence, machine, p->prediction, at[i]);
-      });
+      p->columns = columns_of(evidence, machine, p->prediction, at);
       result.simulations += static_cast<int>(live.size());
     }
     return *p;
@@ -170,9 +212,7 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
     const Point& p = visit(x, derivatives);
     const std::vector<Column> none;
     const Eigen::Index used = derivatives ? k : 0;
-    const Eigen::MatrixXd g = evidence.sum(
-        evidence.grams(pointers(p.residual, derivatives ? p.columns : none, linear.columns)),
-        Role::fitted);
+    const Eigen::MatrixXd g = products.with(p.residual, derivatives ? p.columns : none).fitted;
     const Eliminated e = eliminate(g, used, linear);
     Linearisation at{e.cost, {}, {}};
     if (derivatives) {
@@ -195,10 +235,9 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
   const LeastSquaresSolution solution = solve(problem);
 
   Point& best = visit(solution.x, true);
-  const BlockGrams grams = evidence.grams(pointers(best.residual, {}, linear.columns));
+  const RoleGrams grams = products.with(best.residual, {});
   const LinearStep step =
-      linear_step(evidence.sum(grams, Role::fitted), evidence.sum(grams, Role::held_out),
-                  linear.precision(), linear.offset());
+      linear_step(grams.fitted, grams.held_out, linear.precision(), linear.offset());
   result.live = moved(live, solution.x);
   result.linear = linear.numbers;
   for (std::size_t i = 0; i < result.linear.size(); ++i) {

@@ -54,8 +54,8 @@ struct Refit {
 Refit refit(const Evidence& evidence, const Machine& start, const std::vector<FreedNumber>& live,
             const LinearPart& linear, int max_iterations = 12);
 
-/// Forward difference of a prediction with respect to a number, per typical size.
-Column column_of(const Evidence& evidence, const Machine& machine, const Prediction& base,
-                 const FreedNumber& number);
+/// Forward differences of a prediction with respect to some numbers, per typical size.
+std::vector<Column> columns_of(const Evidence& evidence, const Machine& machine,
+                               const Prediction& base, const std::vector<FreedNumber>& numbers);
 
 }  // namespace vcnc

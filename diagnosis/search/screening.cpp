@@ -81,16 +81,33 @@ std::vector<TrialColumns> simulate_trials(const Evidence& evidence, const Machin
     all[t].columns.resize(all[t].trial.directions.size());
     for (std::size_t d = 0; d < all[t].columns.size(); ++d) jobs.emplace_back(t, d);
   }
+  // Those of one place together: they move the same axis.
+  std::stable_sort(jobs.begin(), jobs.end(), [&](const auto& x, const auto& y) {
+    const auto place = [&](const auto& job) -> const std::string& {
+      return candidates[all[job.first].trial.candidate].place;
+    };
+    return place(x) < place(y);
+  });
+  const std::size_t parts = (jobs.size() + Evidence::kTogether - 1) / Evidence::kTogether;
   std::atomic<bool> go = true;
   std::atomic<std::size_t> done = 0;
-  parallel_for(jobs.size(), [&](std::size_t j) {
+  parallel_for(parts, [&](std::size_t part) {
     if (!go) return;
-    const auto [t, d] = jobs[j];
-    const Trial& trial = all[t].trial;
-    const Machine changed =
-        machine_of(base, candidates[trial.candidate], trial, trial.directions[d]);
-    all[t].columns[d] = evidence.sensitivity(prediction, evidence.predict(changed), 1);
-    const double share = static_cast<double>(++done) / static_cast<double>(jobs.size());
+    const std::size_t first = part * Evidence::kTogether,
+                      last = std::min(first + Evidence::kTogether, jobs.size());
+    std::vector<Machine> changed;
+    for (std::size_t j = first; j < last; ++j) {
+      const Trial& trial = all[jobs[j].first].trial;
+      changed.push_back(
+          machine_of(base, candidates[trial.candidate], trial, trial.directions[jobs[j].second]));
+    }
+    std::vector<Prediction> predictions = evidence.predict_all(changed);
+    for (std::size_t j = first; j < last; ++j) {
+      Prediction& p = predictions[j - first];
+      all[jobs[j].first].columns[jobs[j].second] = evidence.sensitivity(prediction, p, 1);
+      p.clear();
+    }
+    const double share = static_cast<double>(++done) / static_cast<double>(parts);
     if (!keep_going(share)) go = false;
   });
   const Column nothing(Column::Channels(prediction.size()));

@@ -44,23 +44,75 @@ void settle(const Evidence& evidence, FittedMachine& m, const Refit& f) {
   m.residual = evidence.residual(m.prediction);
   m.columns = f.columns;
   const Ground ground(evidence, m.residual, m.linear());
-  m.fitted = f.fitted;
   m.held_out = ground.held_out;
 }
 
+/// Chi-square of the fitted laps with what the numbers are off their declaration.
+double misfit(const Evidence& evidence, const Column& residual,
+              const std::vector<FreedNumber>& numbers) {
+  double sum = evidence.chi2(residual, Role::fitted);
+  for (const FreedNumber& n : numbers) sum += n.pull() * n.pull();
+  return sum;
+}
+
+/// Declared numbers are not believed to be off by more than this many tolerances, wherever the
+/// sensitivities point to; further ones are released or compete as effects.
+constexpr double kFarthestPull = 20;
+
+/// Part of the way from `from` to `to`.
+std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vector<FreedNumber> to,
+                                 double share) {
+  for (FreedNumber& n : to) {
+    for (const FreedNumber& f : from)
+      if (f.number.key == n.number.key) n.value = f.value + share * (n.value - f.value);
+    if (n.tolerance > 0) {
+      const double reach = kFarthestPull * n.tolerance;
+      n.value = std::clamp(n.value, n.centre - reach, n.centre + reach);
+    }
+    n.value = std::clamp(n.value, std::min(n.number.min, n.number.max),
+                         std::max(n.number.min, n.number.max));
+  }
+  return to;
+}
+
+/// Goes as far towards a refit as makes the misfit smaller: sensitivities are not everywhere what
+/// they are where they were taken. False: not a step.
+bool step_towards(const Evidence& evidence, FittedMachine& m, const Refit& f, double& least) {
+  std::vector<FreedNumber> old = m.nuisances.numbers;
+  for (const FreedNumber& n : m.numbers()) old.push_back(n);
+  for (const double share : {1.0, 0.5, 0.2, 0.05}) {
+    Refit part = f;
+    part.linear = between(old, f.linear, share);
+    part.live = between(old, f.live, share);
+    part.machine = with(with(m.machine, part.live), part.linear);
+    FittedMachine trial = m;
+    settle(evidence, trial, part);
+    const double now = misfit(evidence, trial.residual, trial.nuisances.numbers);
+    if (!(now < least)) continue;
+    least = now;
+    m = std::move(trial);
+    return true;
+  }
+  return false;
+}
+
+/// A refit that went nowhere.
+Refit stayed(const FittedMachine& m, Refit f) {
+  f.machine = m.machine;
+  f.linear = m.nuisances.numbers;
+  f.live = m.numbers();
+  return f;
+}
+
 void linearise_nuisances(const Evidence& evidence, FittedMachine& m) {
-  m.nuisances.columns.resize(m.nuisances.numbers.size());
-  parallel_for(m.nuisances.numbers.size(), [&](std::size_t i) {
-    FreedNumber scaled = m.nuisances.numbers[i];
-    m.nuisances.columns[i] = column_of(evidence, m.machine, m.prediction, scaled);
-  });
+  m.nuisances.columns = columns_of(evidence, m.machine, m.prediction, m.nuisances.numbers);
 }
 
 constexpr int kLinearisations = 3;  ///< at most, of the declared machine
 constexpr double kSettled = 5;      ///< chi-square that no further one is worth
 constexpr int kGlance = 4;          ///< iterations to see what a candidate is worth
 constexpr double kClearLoss = 4;    ///< times the least gain: no need to look closer
-constexpr std::size_t kFinalists = 3, kRivals = 4;
+constexpr std::size_t kFinalists = 3, kRivals = 4, kMoreRefits = 8;
 
 /// What a candidate came to.
 struct Contender {
@@ -69,6 +121,7 @@ struct Contender {
   Refit fit;
   double gain = 0;
   std::string released;  ///< key of a declared number whose tolerance is lifted; else empty
+  bool converged = false;
 };
 
 class Search {
@@ -84,7 +137,8 @@ class Search {
   SelectionResult run() {
     go("fitting the declared machine", 0);
     result_.base = fit_declared(evidence_, declared_);
-    floor_ = result_.floor = noise_floor(evidence_, result_.base.residual);
+    floor_ = result_.floor =
+        noise_floor(evidence_, result_.base.residual, options_.form_of_channel);
     FittedMachine& now = result_.found = result_.base;
     simulate();
     while (now.added.size() + now.released.size() < options_.max_effects && going_) {
@@ -185,25 +239,85 @@ class Search {
                          [&](const AddedEffect& a) { return a.candidate == candidate_of(s); });
     });
     const std::vector<Screened> list = shortlist(screened);
+    std::vector<Contender> all = refitted(now, linear, ground, list);
+    finish(now, linear, ground, all);
+    if (const std::vector<Screened> more = likes_of(ground, all, screened, list); !more.empty()) {
+      std::vector<Contender> others = refitted(now, linear, ground, more);
+      std::move(others.begin(), others.end(), std::back_inserter(all));
+      finish(now, linear, ground, all);
+    }
+    for (Contender& c : releases(now, linear, ground)) all.push_back(std::move(c));
+    const double needed = threshold(ground.held_out);
+    std::erase_if(all, [&](const Contender& c) {
+      return c.gain <= needed ||
+             (c.released.empty() && (counted_gain(now, linear, ground, c) <= needed ||
+                                     !under_two_conditions(now, linear, c)));
+    });
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Contender& x, const Contender& y) { return worth(x) > worth(y); });
+    put_simplest_first(ground, all);
+    if (all.empty() || all.front().gain < 0.5 * excess(ground.held_out))
+      look_ahead(now, linear, ground, screened, all);
+    return all;
+  }
+
+  std::vector<Contender> refitted(const FittedMachine& now, const LinearPart& linear,
+                                  const Ground& ground, const std::vector<Screened>& list) {
     std::vector<Contender> all(list.size());
     std::atomic<std::size_t> done = 0;
-    parallel_for(list.size(), [&](std::size_t i) {
+    evidence_.each_together(list.size(), [&](std::size_t i) {
       if (!going_) return;
       all[i] = contender(now, linear, ground, {list[i].trial}, list[i].size, list[i].gain);
       go("refitting " + std::to_string(list.size()) + " candidates",
          static_cast<double>(++done) / static_cast<double>(list.size()));
     });
-    finish(now, linear, ground, all);
-    for (Contender& c : releases(now, linear, ground)) all.push_back(std::move(c));
-    const double needed = threshold(ground.held_out);
-    std::erase_if(all, [&](const Contender& c) {
-      return c.gain <= needed || (c.released.empty() && !under_two_conditions(now, linear, c));
-    });
-    std::stable_sort(all.begin(), all.end(),
-                     [](const Contender& x, const Contender& y) { return worth(x) > worth(y); });
-    if (all.empty() || all.front().gain < 0.5 * excess(ground.held_out))
-      look_ahead(now, linear, ground, screened, all);
     return all;
+  }
+
+  /// Gains that differ by less are alike when the best is `gain`.
+  double band_of(const Ground& ground, double gain) const {
+    return options_.class_gain + options_.class_share * excess(ground.held_out - gain);
+  }
+
+  /// What was left out of a list though its promise is like the best gain.
+  std::vector<Screened> likes_of(const Ground& ground, const std::vector<Contender>& all,
+                                 const std::vector<Screened>& screened,
+                                 const std::vector<Screened>& list) const {
+    std::vector<Screened> more;
+    if (all.empty()) return more;
+    const double best = all.front().gain;
+    if (best < threshold(ground.held_out)) return more;
+    for (const Screened& s : screened) {
+      if (more.size() == kMoreRefits || s.gain < best - 2 * band_of(ground, best)) break;
+      if (std::none_of(list.begin(), list.end(),
+                       [&](const Screened& l) { return l.trial == s.trial; }))
+        more.push_back(s);
+    }
+    return more;
+  }
+
+  /// Of those that do as well as the first, the one with the fewest numbers, of a size nearest to
+  /// the typical one.
+  void put_simplest_first(const Ground& ground, std::vector<Contender>& all) const {
+    if (all.empty() || !all.front().released.empty()) return;
+    const double band = band_of(ground, all.front().gain);
+    auto simplest = all.begin();
+    for (auto c = all.begin(); c != all.end(); ++c)
+      if (c->released.empty() && c->gain > all.front().gain - band &&
+          intricacy(*c) < intricacy(*simplest))
+        simplest = c;
+    std::rotate(all.begin(), simplest, simplest + 1);
+  }
+
+  /// Numbers, and two for every tenth or tenfold of the typical size.
+  double intricacy(const Contender& c) const {
+    double largest = 0;
+    for (const FreedNumber& n : c.numbers)
+      for (const FreeNumber& own : candidates_[c.candidate].numbers)
+        if (own.key == n.number.key && !n.shape && !is_phase(own) && own.typical != 0)
+          largest = std::max(largest, std::abs(n.value / own.typical));
+    const double unusual = largest > 0 ? std::abs(std::log10(largest)) : 0;
+    return static_cast<double>(c.numbers.size()) + 2 * unusual;
   }
 
   /// Gain less what further numbers give by chance.
@@ -246,14 +360,19 @@ class Search {
     std::stable_sort(all.begin(), all.end(),
                      [](const Contender& x, const Contender& y) { return x.gain > y.gain; });
     const double best = all.empty() ? 0 : all.front().gain;
-    for (std::size_t i = 0; i < all.size() && going_; ++i) {
+    std::size_t finalists = 0;
+    while (finalists < all.size() && all[finalists].gain >= 0.5 * best &&
+           (finalists < kFinalists || all[finalists].gain >= best - options_.class_gain))
+      ++finalists;
+    evidence_.each_together(finalists, [&](std::size_t i) {
+      if (!going_) return;
       Contender& c = all[i];
-      if (i >= kFinalists && c.gain < best - options_.class_gain) break;
-      if (c.gain < 0.5 * best) break;
+      if (c.converged) return;
+      c.converged = true;
       c.fit = refit(evidence_, now.machine, c.numbers, without(linear, c.numbers));
       c.numbers = c.fit.live;
       c.gain = ground.held_out - c.fit.held_out;
-    }
+    });
   }
 
   /// A declared number whose tolerance is lifted competes with the effects.
@@ -276,6 +395,30 @@ class Search {
       all.push_back(std::move(c));
     }
     return all;
+  }
+
+  /// Held-out gain less the share of what is found already that its model may be wrong by.
+  double counted_gain(const FittedMachine& now, const LinearPart& linear, const Ground& ground,
+                      const Contender& c) const {
+    const std::vector<double>& form = options_.form_of_channel;
+    if (form.empty() && (now.added.empty() || options_.share_of_found == 0)) return c.gain;
+    const LinearPart others = without(linear, c.numbers);
+    const Eigen::VectorXd step =
+        linear_step(ground.grams.fitted, ground.grams.held_out, ground.precision, ground.offset)
+            .step;
+    const Column before = less(now.residual, linear.columns, step),
+                 after = less(c.fit.residual, others.columns, c.fit.linear_step);
+    double counted = c.gain;
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      const double left = evidence_.chi2(before, i, Role::held_out);
+      const double gain = left - evidence_.chi2(after, i, Role::held_out);
+      const double explained =
+          std::max(0.0, evidence_.chi2(result_.base.residual, i, Role::held_out) - left);
+      const double doubtful = options_.share_of_found * explained +
+                              (form.empty() ? 0 : options_.taken_of_form * form[i]);
+      counted -= std::clamp(gain, 0.0, doubtful);
+    }
+    return counted;
   }
 
   /// Held-out gain per condition: an effect that shows under several must help under two.
@@ -337,19 +480,22 @@ class Search {
     const auto [i, j] = pairs[best];
     Contender c = contender(now, linear, ground, {screened[i].trial, screened[j].trial},
                             sizes[best], gains[best]);
-    if (c.gain > single + least) all.insert(all.begin(), std::move(c));
+    if (counted_gain(now, linear, ground, c) > single + least)
+      all.insert(all.begin(), std::move(c));
   }
 
   /// Indices of contenders that do as well as the first.
   std::vector<std::size_t> equivalents(const FittedMachine&,
                                        const std::vector<Contender>& contenders) const {
     std::vector<std::size_t> all;
-    const Contender& best = contenders.front();
-    const double remaining = excess(best.released.empty() ? best.fit.held_out : floor_);
+    const auto most =
+        std::max_element(contenders.begin(), contenders.end(),
+                         [](const Contender& x, const Contender& y) { return x.gain < y.gain; });
+    const double remaining = excess(most->released.empty() ? most->fit.held_out : floor_);
     const double band = options_.class_gain + options_.class_share * remaining;
     for (std::size_t i = 1; i < contenders.size(); ++i)
-      if (contenders[i].released.empty() && contenders[i].gain > best.gain - band &&
-          contenders[i].gain > 0.5 * best.gain)
+      if (contenders[i].released.empty() && contenders[i].gain > most->gain - band &&
+          contenders[i].gain > 0.5 * most->gain)
         all.push_back(contenders[i].candidate);
     return all;
   }
@@ -444,9 +590,11 @@ class Search {
                            [&](const AddedEffect& a) { return a.candidate == candidate_of(s); });
       });
       if (screened.size() > kRivals) screened.resize(kRivals);
-      std::vector<Contender> rivals;
-      for (const Screened& s : screened)
-        rivals.push_back(contender(less, linear, ground, {s.trial}, s.size, s.gain));
+      std::vector<Contender> rivals(screened.size());
+      evidence_.each_together(screened.size(), [&](std::size_t r) {
+        const Screened& s = screened[r];
+        rivals[r] = contender(less, linear, ground, {s.trial}, s.size, s.gain);
+      });
       std::stable_sort(rivals.begin(), rivals.end(),
                        [](const Contender& x, const Contender& y) { return worth(x) > worth(y); });
       const double band = options_.class_gain + options_.class_share * excess(m.held_out);
@@ -518,10 +666,15 @@ LinearPart FittedMachine::linear() const {
 void converge(const Evidence& evidence, FittedMachine& m) {
   constexpr int kRounds = 3;
   double before = m.held_out;
+  double least =
+      misfit(evidence, evidence.residual(evidence.predict(m.machine)), m.nuisances.numbers);
   for (int round = 0; round < kRounds; ++round) {
     const std::vector<FreedNumber> live = m.numbers();
     const Refit f = refit(evidence, m.machine, live, without(m.nuisances, live), 8);
-    settle(evidence, m, f);
+    if (!step_towards(evidence, m, f, least)) {
+      if (round == 0) settle(evidence, m, stayed(m, f));
+      break;
+    }
     const double now = m.held_out;
     if (std::abs(before - now) < 1 + 1e-4 * std::abs(now - evidence.count(Role::held_out))) break;
     before = now;
@@ -529,9 +682,14 @@ void converge(const Evidence& evidence, FittedMachine& m) {
 }
 
 FittedMachine fit_declared(Evidence& evidence, const Machine& declared) {
+  return fit_numbers(evidence, declared, nuisances(declared));
+}
+
+FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
+                          std::vector<FreedNumber> numbers) {
   FittedMachine m;
   m.machine = declared;
-  m.nuisances.numbers = nuisances(declared);
+  m.nuisances.numbers = std::move(numbers);
   m.prediction = evidence.predict(declared);
   linearise_nuisances(evidence, m);
   // What the run cannot show stays at its declaration.
@@ -554,11 +712,14 @@ FittedMachine fit_declared(Evidence& evidence, const Machine& declared) {
   return m;
 }
 
-double noise_floor(const Evidence& evidence, const Column& residual) {
+double noise_floor(const Evidence& evidence, const Column& residual,
+                   const std::vector<double>& form_of_channel) {
   double floor = 0;
-  for (std::size_t c = 0; c < residual.size(); ++c)
-    floor +=
-        std::min(evidence.count(c, Role::held_out), evidence.chi2(residual, c, Role::held_out));
+  for (std::size_t c = 0; c < residual.size(); ++c) {
+    const double form = form_of_channel.empty() ? 0 : form_of_channel[c];
+    floor += std::min(evidence.count(c, Role::held_out) + form,
+                      evidence.chi2(residual, c, Role::held_out));
+  }
   return floor;
 }
 

@@ -13,6 +13,12 @@
 // excess, and be found under two conditions if the effect shows under two. Candidates that do as
 // well as the best one within 30 and 5 % of what remains are equivalent to it on this record.
 //
+// What found effects explain is never known better than to half a percent: of what a further effect
+// gains in a channel only that counts which exceeds 0.5 % of what they explain there.
+//
+// Of candidates that do as well as the best one, that with the fewest numbers of the most usual
+// size stands for all.
+//
 // Thresholds: chi-square of a few spurious numbers is a few units; 25 is also what five standard
 // deviations of one number give, which is how a detection limit is defined.
 #pragma once
@@ -33,6 +39,11 @@ struct DiagnosisOptions {
   double least_gain = 25, least_share = 0.02;
   /// Chi-square that a model may leave by its form alone, and the share of it an effect must gain.
   double form = 0, share_of_form = 0;
+  double share_of_found = 0;  ///< of what found effects explain, see above
+  /// Chi-square per channel that the model is known to leave by its form, and the share of it that
+  /// one effect may take for its own. Empty: none.
+  std::vector<double> form_of_channel;
+  double taken_of_form = 0.5;
   double class_gain = 30, class_share = 0.05;
   double law_gain = 40;           ///< of a generic law
   double model_form = 1.10;       ///< chi-square per sample above which no cause is named
@@ -66,7 +77,6 @@ struct FittedMachine {
   Prediction prediction;
   Column residual;
   std::vector<Column> columns;  ///< of all numbers of `added`, in order
-  double fitted = 0;            ///< chi-square with priors
   double held_out = std::numeric_limits<double>::infinity();
 
   std::vector<FreedNumber> numbers() const;  ///< of all added effects
@@ -91,10 +101,14 @@ SelectionResult select_effects_of(Evidence& evidence, const Machine& declared,
 /// Fits all numbers of a machine together, nuisances included, until nothing moves.
 void converge(const Evidence& evidence, FittedMachine& machine);
 
-/// Held-out chi-square that noise makes: one per sample, less where a channel is quieter than that.
-double noise_floor(const Evidence& evidence, const Column& residual);
+/// Held-out chi-square that noise and the form of the model make: one per sample and the form's,
+/// less where a channel is quieter than that.
+double noise_floor(const Evidence& evidence, const Column& residual,
+                   const std::vector<double>& form_of_channel = {});
 
-/// The declared machine with its nuisances fitted.
+/// The declared machine with its nuisances fitted, or with these numbers.
 FittedMachine fit_declared(Evidence& evidence, const Machine& declared);
+FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
+                          std::vector<FreedNumber> numbers);
 
 }  // namespace vcnc

@@ -36,6 +36,8 @@ bool is_fixed(const FreeNumber& n) {
 
 bool is_phase(const FreeNumber& n) { return contains(n.key, ".phase_"); }
 
+bool is_limit(const FreeNumber& n) { return contains(n.key, ".range_clip.limit_"); }
+
 std::vector<Trial> trials(const Machine& base, const std::vector<Candidate>& candidates,
                           const TrialValues& trial_values) {
   std::vector<Trial> all;
@@ -60,6 +62,15 @@ std::vector<Trial> trials(const Machine& base, const std::vector<Candidate>& can
         first.directions.push_back({i, true, step});
     }
     std::vector<Trial> grid{first};
+    for (Direction& direction : first.directions)
+      if (const FreeNumber& n = candidate.numbers[direction.number]; is_limit(n) && !present) {
+        direction.whole = true;
+        grid.clear();
+        for (const double value : trial_values(candidate, direction.number)) {
+          direction.step = value - first.values[direction.number];
+          grid.push_back(first);
+        }
+      }
     for (std::size_t i = 0; i < candidate.numbers.size() && !present; ++i) {
       if (!is_shape(candidate, i) || is_fixed(candidate.numbers[i]) || i == phase) continue;
       std::vector<Trial> wider;
@@ -101,7 +112,8 @@ std::vector<FreedNumber> start_of(const Candidate& candidate, const Trial& trial
   std::vector<double> in(values.size(), 0.0), across(values.size(), 0.0);
   for (std::size_t d = 0; d < trial.directions.size(); ++d) {
     const Direction& direction = trial.directions[d];
-    const double part = size[static_cast<Eigen::Index>(d)] * direction.step;
+    const double share = direction.whole ? 1 : size[static_cast<Eigen::Index>(d)];
+    const double part = share * direction.step;
     (direction.quadrature ? across : in)[direction.number] = part;
   }
   if (two) {
@@ -125,7 +137,7 @@ std::vector<FreedNumber> start_of(const Candidate& candidate, const Trial& trial
     freed.number.typical = std::abs(n.typical) > 0 ? std::abs(n.typical) : 1;
     if (is_phase(n)) freed.number.typical = 57.3;
     if (shape && !is_phase(n)) freed.number.typical = std::max(std::abs(values[i]), 1e-6);
-    freed.shape = shape && !is_phase(n);
+    freed.shape = (shape && !is_phase(n)) || is_limit(n);
     numbers.push_back(freed);
   }
   return numbers;

@@ -7,7 +7,8 @@
 //
 // so that the phase needs no search. Shapes that cannot be linearised away are tried at several
 // values: wavelengths and frequencies where the residual has lines (trial_values), time constants
-// at shares of the run's length, places across the travel.
+// at shares of the run's length, places across the travel. An amplitude of which nothing would be
+// most, not least (the end of a scale: 0 is none), is tried at several values as well.
 #pragma once
 
 #include <Eigen/Dense>
@@ -25,6 +26,7 @@ struct Direction {
   std::size_t number = 0;   ///< index of the amplitude
   bool quadrature = false;  ///< with the phase at 90 deg
   double step = 0;          ///< change of the amplitude, in the unit of its key
+  bool whole = false;       ///< the step is the amplitude, not a measure of it
 };
 
 struct Trial {
@@ -39,6 +41,8 @@ using TrialValues = std::function<std::vector<double>(const Candidate&, std::siz
 /// A number that only shifts what others do (a reference position): never fitted.
 bool is_fixed(const FreeNumber& number);
 bool is_phase(const FreeNumber& number);
+/// An amplitude whose null value is no limit at all: it does more the smaller it is.
+bool is_limit(const FreeNumber& number);
 
 std::vector<Trial> trials(const Machine& base, const std::vector<Candidate>& candidates,
                           const TrialValues& values);

@@ -105,6 +105,16 @@ std::vector<double> TrialValuesOf::find_wavelengths(std::size_t axis,
   return best;
 }
 
+double TrialValuesOf::largest_reading() const {
+  double largest = 0;
+  for (const ComparedChannel& c : evidence_.replica().channels()) {
+    if (c.kind != SignalKind::deflection) continue;
+    for (const double value : evidence_.record().find(c.kind, c.axis)->value)
+      if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  }
+  return largest;
+}
+
 double TrialValuesOf::find_jump(const Column& residual) const {
   const std::size_t window = 50;
   double largest = 0, at = 0;
@@ -131,7 +141,10 @@ std::vector<double> TrialValuesOf::operator()(const Candidate& candidate,
   const auto more = [&](const std::vector<double>& further) {
     values.insert(values.end(), further.begin(), further.end());
   };
-  if (contains(n.key, "frequency_Hz")) {
+  if (is_limit(n)) {
+    const double largest = largest_reading() / si_of_unit(n.key);
+    for (const double share : {0.995, 0.97, 0.9, 0.8}) more({share * largest});
+  } else if (contains(n.key, "frequency_Hz")) {
     for (const NoiseLine& line : evidence_.noise().lines) more({line.frequency});
   } else if (contains(n.key, ".time_constant_s")) {
     values.clear();

@@ -27,6 +27,7 @@ class TrialValuesOf {
  private:
   std::vector<double> find_wavelengths(std::size_t axis, const Column& residual) const;
   double find_jump(const Column& residual) const;
+  double largest_reading() const;  ///< of the probe [m]
 
   const Evidence& evidence_;
   double duration_ = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace vcnc {
 namespace {
@@ -19,7 +20,8 @@ double observer_bandwidth(const ServoParams& servo) {
 
 }  // namespace
 
-VelocityObserver::VelocityObserver(double bandwidth, double inertia, double position)
+template <class Real>
+VelocityObserverOf<Real>::VelocityObserverOf(double bandwidth, double inertia, double position)
     : inverse_inertia_(1 / inertia), position_(position) {
   const double pole = std::exp(-bandwidth * kDriveLoopTime), fade = 1 - pole;
   gain_position_ = 1 - pole * pole * pole;
@@ -27,83 +29,133 @@ VelocityObserver::VelocityObserver(double bandwidth, double inertia, double posi
   gain_disturbance_ = fade * fade * fade / (kDriveLoopTime * kDriveLoopTime);
 }
 
-void VelocityObserver::step(double force, double position) {
-  const double acceleration = force * inverse_inertia_ + disturbance_;
+template <class Real>
+void VelocityObserverOf<Real>::step(Real force, Real position) {
+  const Real acceleration = force * inverse_inertia_ + disturbance_;
   position_ += kDriveLoopTime * (velocity_ + 0.5 * kDriveLoopTime * acceleration);
   velocity_ += kDriveLoopTime * acceleration;
-  const double residual = position - position_;
+  const Real residual = position - position_;
   position_ += gain_position_ * residual;
   velocity_ += gain_velocity_ * residual;
   disturbance_ += gain_disturbance_ * residual;
 }
 
-AxisDrive::AxisDrive(const Machine& machine, std::size_t axis, std::uint64_t seed)
-    : AxisDrive(machine.axes[axis], vcnc::actual(machine).axes[axis], machine.effects, axis, seed) {
-}
-
 namespace {
+
 Effects on_x(const AxisEffects& effects) {
   Effects all;
   all.axis[kX] = effects;
   return all;
 }
+
 }  // namespace
 
-AxisDrive::AxisDrive(const AxisParams& params, const AxisEffects& effects)
-    : AxisDrive(params, params, on_x(effects), kX, 1) {}
+template <class Real>
+AxisDriveOf<Real>::AxisDriveOf(const Machine& machine, std::size_t axis, std::uint64_t seed)
+    : AxisDriveOf(machine.axes[axis], vcnc::actual(machine).axes[axis], machine.effects, axis,
+                  seed) {}
 
-AxisDrive::AxisDrive(const AxisParams& declared, const AxisParams& actual, const Effects& effects,
-                     std::size_t axis, std::uint64_t seed)
+template <class Real>
+AxisDriveOf<Real>::AxisDriveOf(const AxisParams& params, const AxisEffects& effects)
+    : AxisDriveOf(params, params, on_x(effects), kX, 1) {}
+
+template <class Real>
+AxisDriveOf<Real>::AxisDriveOf(const AxisParams& declared, const AxisParams& actual,
+                               const Effects& effects, std::size_t axis, std::uint64_t seed)
     : axis_(axis),
       feedback_(actual.servo.feedback),
-      declared_(declared.mechanics),
-      actual_(actual.mechanics),
-      setpoint_{actual.limits.start, 0},
+      travel_per_turn_(declared.mechanics.travel_per_turn),
+      force_limit_(declared.mechanics.force_limit),
+      setpoint_{actual.limits.start, 0.0},
       inertia_(declared.mechanics.total_inertia()),
       plant_inertia_(actual.mechanics.total_inertia()),
       motor_inertia_(actual.mechanics.reflected_inertia()),
-      servo_{.kv = actual.servo.kv_per_s,
-             .velocity_gain = 1,
-             .integral_time = actual.servo.integral_time,
-             .velocity_ff = actual.servo.velocity_ff,
-             .acceleration_ff = actual.servo.acceleration_ff,
-             .current_lag = actual.servo.current_lag,
-             .force_limit = actual.mechanics.force_limit},
-      reception_(axis_chain<ReceptionPort>(effects, axis, seed)),
-      shaping_(axis_chain<SetpointPort>(effects, axis, seed)),
-      counting_(axis_chain<EncoderPort>(effects, axis, seed)),
-      motor_(axis_chain<MotorForcePort>(effects, axis, seed)),
-      load_(axis_chain<LoadForcePort>(effects, axis, seed)),
-      rubbing_(axis_chain<FrictionPort>(effects, axis, seed)),
-      displacing_(axis_chain<DisplacementPort>(effects, axis, seed)),
+      load_inertia_(actual.mechanics.load),
       laws_(!effects.laws.empty()),
       x_load_(actual.limits.start),
       x_motor_(actual.limits.start),
       last_raw_(setpoint_),
-      last_shaped_(setpoint_),
-      observer_(observer_bandwidth(declared.servo), inertia_, encoder(actual.limits.start)) {
-  axis_chain<ServoPort>(effects, axis, seed).step(servo_, {});
+      last_shaped_(setpoint_) {
+  for (std::size_t i = 0; i < kLanesOf<Real>; ++i) {
+    reception_.set(i, axis_chain<ReceptionPort>(effects, axis, seed));
+    shaping_.set(i, axis_chain<SetpointPort>(effects, axis, seed));
+    counting_.set(i, axis_chain<EncoderPort>(effects, axis, seed));
+    motor_.set(i, axis_chain<MotorForcePort>(effects, axis, seed));
+    load_.set(i, axis_chain<LoadForcePort>(effects, axis, seed));
+    rubbing_.set(i, axis_chain<FrictionPort>(effects, axis, seed));
+    displacing_.set(i, axis_chain<DisplacementPort>(effects, axis, seed));
+  }
+  const double start = lane(encoder(actual.limits.start), 0);
+  const double inertia = declared.mechanics.total_inertia();
+  observer_ = {observer_bandwidth(declared.servo), inertia, start};
+  ServoPort::Signal<double> servo{.kv = actual.servo.kv_per_s,
+                                  .velocity_gain = 1,
+                                  .integral_time = actual.servo.integral_time,
+                                  .velocity_ff = actual.servo.velocity_ff,
+                                  .acceleration_ff = actual.servo.acceleration_ff,
+                                  .current_lag = actual.servo.current_lag,
+                                  .force_limit = actual.mechanics.force_limit};
+  axis_chain<ServoPort>(effects, axis, seed).step(servo, {});
+  servo_ = {servo.kv,          servo.velocity_gain,   servo.integral_time,
+            servo.velocity_ff, servo.acceleration_ff, servo.current_lag,
+            servo.force_limit};
   const double crossover = 2 * kPi * actual.servo.velocity_bandwidth;
-  kp_ = actual.servo.velocity_gain > 0 ? actual.servo.velocity_gain : crossover * inertia_;
-  kp_ *= servo_.velocity_gain;
+  double kp = actual.servo.velocity_gain > 0 ? actual.servo.velocity_gain : crossover * inertia;
+  kp *= servo.velocity_gain;
+  kp_ = kp;
   if (actual.servo.controller == ServoParams::Controller::sampled)
-    sampled_.emplace(kp_, inertia_, actual.servo.dead_time, encoder(actual.limits.start));
-  lag_share_ = servo_.current_lag > 0 ? -std::expm1(-kPlantTime / servo_.current_lag) : 1;
+    sampled_.emplace(kp, inertia, actual.servo.dead_time, start);
+  lag_share_ = servo.current_lag > 0 ? -std::expm1(-kPlantTime / servo.current_lag) : 1;
   TransmissionPort::Signal<double> transmission{.damping_ratio = 0.05};
   axis_chain<TransmissionPort>(effects, axis, seed).step(transmission, {});
-  couple(transmission);
+  couple(transmission, actual.mechanics.load);
 }
 
-void AxisDrive::couple(const TransmissionPort::Signal<double>& transmission) {
+template <class Real>
+AxisDriveOf<Real>::AxisDriveOf(std::vector<AxisDriveOf<double>> drives)
+    : axis_(drives[0].axis_),
+      feedback_(drives[0].feedback_),
+      travel_per_turn_(drives[0].travel_per_turn_),
+      force_limit_(drives[0].force_limit_),
+      two_masses_(drives[0].two_masses_),
+      laws_(drives[0].laws_) {
+  for (std::size_t i = 0; i < kLanesOf<Real>; ++i) {
+    AxisDriveOf<double>& drive = drives[std::min(i, drives.size() - 1)];
+    const auto from = drive.numbers();
+    auto to = numbers();
+    [&]<std::size_t... n>(std::index_sequence<n...>) {
+      (set_lane(std::get<n>(to), i, std::get<n>(from)), ...);
+    }
+    (std::make_index_sequence<std::tuple_size_v<decltype(to)>>());
+    if (i >= drives.size()) continue;
+    reception_.set(i, std::move(drive.reception_.chain(0)));
+    shaping_.set(i, std::move(drive.shaping_.chain(0)));
+    counting_.set(i, std::move(drive.counting_.chain(0)));
+    motor_.set(i, std::move(drive.motor_.chain(0)));
+    load_.set(i, std::move(drive.load_.chain(0)));
+    rubbing_.set(i, std::move(drive.rubbing_.chain(0)));
+    displacing_.set(i, std::move(drive.displacing_.chain(0)));
+  }
+}
+
+template <class Real>
+bool AxisDriveOf<Real>::suits(const AxisDriveOf& other) const {
+  return axis_ == other.axis_ && feedback_ == other.feedback_ &&
+         travel_per_turn_ == other.travel_per_turn_ && force_limit_ == other.force_limit_ &&
+         two_masses_ == other.two_masses_ && laws_ == other.laws_ && !sampled_ && !other.sampled_;
+}
+
+template <class Real>
+void AxisDriveOf<Real>::couple(const TransmissionPort::Signal<double>& transmission, double load) {
   if (!(transmission.compliance > 0 || transmission.gap > 0)) return;
   two_masses_ = true;
   half_gap_ = 0.5 * transmission.gap;
-  const double load = actual_.load;
-  if (!(motor_inertia_ > 1e-3 * load))
+  const double motor = lane(motor_inertia_, 0);
+  if (!(motor > 1e-3 * load))
     throw std::invalid_argument(
         "motor_inertia_kgm2: wind-up and backlash need a motor side of at least a thousandth of "
         "the load");
-  const double reduced = load * motor_inertia_ / (load + motor_inertia_);
+  const double reduced = load * motor / (load + motor);
   double resonance = 2 * kPi * kContactResonance;
   if (transmission.compliance > 0) resonance = std::sqrt(1 / (transmission.compliance * reduced));
   resonance = std::min(resonance, kLargestPlantAngle / kPlantTime);
@@ -111,15 +163,19 @@ void AxisDrive::couple(const TransmissionPort::Signal<double>& transmission) {
   damping_ = 2 * transmission.damping_ratio * resonance * reduced;
 }
 
-double AxisDrive::encoder(double position) {
+template <class Real>
+Real AxisDriveOf<Real>::encoder(Real position) {
   if (encoder_shift_ != 0) position += encoder_shift_;
-  if (counting_.empty()) return position;
-  EncoderPort::Signal<double> signal{position};
-  counting_.step(signal, {});
-  return signal.position;
+  counting_.each_active([&](Chain<EncoderPort>& chain, std::size_t i) {
+    EncoderPort::Signal<double> signal{lane(position, i)};
+    chain.step(signal, {});
+    set_lane(position, i, signal.position);
+  });
+  return position;
 }
 
-void AxisDrive::tell_commands(const AxisVector& position, const AxisVector& velocity) {
+template <class Real>
+void AxisDriveOf<Real>::tell_commands(const AxisVector& position, const AxisVector& velocity) {
   if (!laws_) return;
   before_position_ = told_ ? told_position_ : position;
   before_velocity_ = told_ ? told_velocity_ : velocity;
@@ -129,103 +185,127 @@ void AxisDrive::tell_commands(const AxisVector& position, const AxisVector& velo
 }
 
 /// The moment of a step within the current loop step.
-Moment AxisDrive::moment(double dt, int steps_per_loop, int step) const {
+template <class Real>
+Moment AxisDriveOf<Real>::moment(double dt, int steps_per_loop, int step) const {
   const std::int64_t count = (cycle_ * kDriveLoopSteps + loop_) * steps_per_loop + step;
   return {static_cast<double>(count) * dt, dt, count};
 }
 
 /// Motions of all axes at the begin of the current loop step, or at its end.
-void AxisDrive::update_motions(int steps_ahead) {
+template <class Real>
+void AxisDriveOf<Real>::update_motions(int steps_ahead) {
   const double share = static_cast<double>(loop_ + steps_ahead) / kDriveLoopSteps;
   constexpr double kCycleTime = kDriveLoopSteps * kDriveLoopTime;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const double velocity_change = told_velocity_[i] - before_velocity_[i];
-    motions_[i] = {before_position_[i] + share * (told_position_[i] - before_position_[i]),
-                   before_velocity_[i] + share * velocity_change, velocity_change / kCycleTime};
+  for (std::size_t n = 0; n < motions_.size(); ++n) {
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      const double velocity_change = told_velocity_[i] - before_velocity_[i];
+      motions_[n][i] = {before_position_[i] + share * (told_position_[i] - before_position_[i]),
+                        before_velocity_[i] + share * velocity_change,
+                        velocity_change / kCycleTime};
+    }
+    motions_[n][axis_] = {lane(x_load_, n), lane(v_load_, n), lane(a_load_, n)};
   }
-  motions_[axis_] = {x_load_, v_load_, a_load_};
 }
 
-AxisCycle AxisDrive::follow(const AxisSetpoint& sent) {
+template <class Real>
+AxisCycleOf<Real> AxisDriveOf<Real>::follow(const Setpoint& sent) {
   constexpr double kCycleTime = kDriveLoopSteps * kDriveLoopTime;
-  AxisSetpoint target = sent;
-  if (!reception_.empty()) {
-    ReceptionPort::Signal<double> signal{sent.position, sent.velocity};
-    reception_.step(signal, {{static_cast<double>(cycle_) * kCycleTime, kCycleTime, cycle_}});
-    target = {signal.position, signal.velocity};
-  }
+  Setpoint target = sent;
+  reception_.each_active([&](Chain<ReceptionPort>& chain, std::size_t i) {
+    ReceptionPort::Signal<double> signal{lane(sent.position, i), lane(sent.velocity, i)};
+    chain.step(signal, {{static_cast<double>(cycle_) * kCycleTime, kCycleTime, cycle_}});
+    set_lane(target.position, i, signal.position);
+    set_lane(target.velocity, i, signal.velocity);
+  });
   // Cubic in s = 0..1 over the cycle: x = a + s (b + s (c + s d)).
-  const double b = setpoint_.velocity * kCycleTime, b_end = target.velocity * kCycleTime;
-  const double way = target.position - setpoint_.position;
-  const double c = 3 * way - 2 * b - b_end, d = b + b_end - 2 * way;
+  const Real b = setpoint_.velocity * kCycleTime, b_end = target.velocity * kCycleTime;
+  const Real way = target.position - setpoint_.position;
+  const Real c = 3.0 * way - 2.0 * b - b_end, d = b + b_end - 2.0 * way;
   Course course;
   for (int i = 0; i < kDriveLoopSteps; ++i) {
     const double s = static_cast<double>(i) / kDriveLoopSteps;
     course[static_cast<std::size_t>(i)] = {setpoint_.position + s * (b + s * (c + s * d)),
-                                           (b + s * (2 * c + s * 3 * d)) / kCycleTime};
+                                           (b + s * (2.0 * c + s * 3 * d)) / kCycleTime};
   }
   course.back() = target;
   return run(course);
 }
 
-AxisCycle AxisDrive::brake(double deceleration) {
+template <class Real>
+AxisCycleOf<Real> AxisDriveOf<Real>::brake(double deceleration) {
+  using std::abs, std::copysign, std::min;
   Course course;
   course[0] = setpoint_;
   for (std::size_t i = 1; i < course.size(); ++i) {
-    const AxisSetpoint& from = course[i - 1];
-    const double speed = std::abs(from.velocity);
-    const double time = std::min(kDriveLoopTime, speed / deceleration);
-    const double end = time < kDriveLoopTime ? 0 : speed - deceleration * time;
-    course[i] = {from.position + std::copysign(0.5 * (speed + end) * time, from.velocity),
-                 std::copysign(end, from.velocity)};
+    const Setpoint& from = course[i - 1];
+    const Real speed = abs(from.velocity);
+    const Real time = min(Real(kDriveLoopTime), speed / deceleration);
+    const Real end = choose(time < Real(kDriveLoopTime), Real(0), speed - deceleration * time);
+    course[i] = {from.position + copysign(0.5 * (speed + end) * time, from.velocity),
+                 copysign(end, from.velocity)};
   }
   return run(course);
 }
 
-AxisCycle AxisDrive::hold() {
+template <class Real>
+AxisCycleOf<Real> AxisDriveOf<Real>::hold() {
   Course course;
-  course.fill({setpoint_.position, 0});
+  course.fill({setpoint_.position, Real(0)});
   return run(course);
 }
 
-void AxisDrive::follow_up() {
-  const double measured = encoder(feedback_ == ServoParams::Feedback::motor ? x_motor_ : x_load_);
-  const double told = setpoint_.velocity, seen = observer_.velocity();
-  setpoint_ = last_raw_ = last_shaped_ = {measured, std::abs(seen) < std::abs(told) ? seen : told};
+template <class Real>
+void AxisDriveOf<Real>::follow_up() {
+  using std::abs;
+  const Real measured = encoder(feedback_ == ServoParams::Feedback::motor ? x_motor_ : x_load_);
+  const Real told = setpoint_.velocity, seen = observer_.velocity();
+  setpoint_ = last_raw_ = last_shaped_ = {measured, choose(abs(seen) < abs(told), seen, told)};
 }
 
-bool AxisDrive::standing() const {
-  return std::abs(setpoint_.velocity) < kStandingSpeed &&
-         std::abs(observer_.velocity()) < kStandingSpeed;
+template <class Real>
+bool AxisDriveOf<Real>::standing() const {
+  using std::abs;
+  return all(abs(setpoint_.velocity) < Real(kStandingSpeed)) &&
+         all(abs(observer_.velocity()) < Real(kStandingSpeed));
 }
 
-/// The set-point for the beginning (step 0) or the end (step 1) of the current loop step.
-AxisSetpoint AxisDrive::shaped(const AxisSetpoint& setpoint, double acceleration, int step) {
-  SetpointPort::Signal<double> signal{setpoint.position, setpoint.velocity};
-  shaping_.step(signal,
-                {moment(kDriveLoopTime, 1, step), acceleration, laws_ ? &motions_ : nullptr});
-  return {signal.position, signal.velocity};
+/// Makes of a set-point the one that is used, for the beginning (step 0) or the end (step 1) of the
+/// current loop step.
+template <class Real>
+void AxisDriveOf<Real>::shape(Setpoint& setpoint, Real acceleration, int step) {
+  shaping_.each_active([&](Chain<SetpointPort>& chain, std::size_t i) {
+    SetpointPort::Signal<double> signal{lane(setpoint.position, i), lane(setpoint.velocity, i)};
+    if (step == 0) {
+      constexpr double kRounding = 1e-12;  // v T / T is not always v
+      const bool goes_on = cycle_ > 0 && signal.position == lane(last_raw_.position, i) &&
+                           std::abs(signal.velocity - lane(last_raw_.velocity, i)) < kRounding;
+      if (goes_on) {
+        set_lane(setpoint.position, i, lane(last_shaped_.position, i));
+        set_lane(setpoint.velocity, i, lane(last_shaped_.velocity, i));
+        return;
+      }
+    }
+    chain.step(signal, {moment(kDriveLoopTime, 1, step), lane(acceleration, i), motions(i)});
+    set_lane(setpoint.position, i, signal.position);
+    set_lane(setpoint.velocity, i, signal.velocity);
+  });
 }
 
-AxisCycle AxisDrive::run(const Course& course) {
-  AxisCycle cycle;
-  const bool shape = !shaping_.empty();
-  AxisSetpoint now = course[0];
+template <class Real>
+AxisCycleOf<Real> AxisDriveOf<Real>::run(const Course& course) {
+  Cycle cycle;
+  const bool shaped = shaping_.some_active();
+  Setpoint now = course[0];
   loop_ = 0;
-  if (shape) {
-    constexpr double kRounding = 1e-12;  // v T / T is not always v
-    const bool goes_on = cycle_ > 0 && now.position == last_raw_.position &&
-                         std::abs(now.velocity - last_raw_.velocity) < kRounding;
-    now = goes_on ? last_shaped_ : shaped(now, 0, 0);
-  }
+  if (shaped) shape(now, 0.0, 0);
   for (std::size_t i = 0; i < kDriveLoopSteps; ++i) {
     loop_ = static_cast<int>(i);
     if (laws_) update_motions(0);
-    AxisSetpoint next = course[i + 1];
-    if (shape) next = shaped(next, (next.velocity - course[i].velocity) / kDriveLoopTime, 1);
+    Setpoint next = course[i + 1];
+    if (shaped) shape(next, (next.velocity - course[i].velocity) / kDriveLoopTime, 1);
     if (!sampled_) force_ref_ = control(now, next);
-    const double velocity_before = v_load_;
-    double mean_force = 0;
+    const Real velocity_before = v_load_;
+    Real mean_force{};
     for (plant_step_ = 0; plant_step_ < kPlantStepsPerLoop; ++plant_step_) {
       if (sampled_) force_ref_ = force_demanded();
       force_ += lag_share_ * (force_ref_ - force_);
@@ -239,49 +319,59 @@ AxisCycle AxisDrive::run(const Course& course) {
   setpoint_ = last_raw_ = course.back();
   last_shaped_ = now;
   ++cycle_;
-  const double motor = encoder(x_motor_), load = encoder(x_load_);
+  const Real motor = encoder(x_motor_), load = encoder(x_load_);
   cycle.measured = feedback_ == ServoParams::Feedback::motor ? motor : load;
   cycle.second = load - motor;
-  if (sampled_) sampled_->sample(servo_, now.position, now.velocity, cycle.measured);
-  cycle.force = (sampled_ ? sampled_->demand() : force_) / declared_.force_limit;
+  cycle.force = force_ / force_limit_;
+  if constexpr (std::is_same_v<Real, double>) {
+    if (sampled_) {
+      sampled_->sample(servo_, now.position, now.velocity, cycle.measured);
+      cycle.force = sampled_->demand() / force_limit_;
+    }
+  }
   cycle.velocity = observer_.velocity();
   return cycle;
 }
 
-double AxisDrive::control(const AxisSetpoint& now, const AxisSetpoint& next) {
-  const double measured = encoder(feedback_ == ServoParams::Feedback::motor ? x_motor_ : x_load_);
-  const double v_ref = servo_.kv * (now.position - measured) + servo_.velocity_ff * now.velocity;
-  const double error = v_ref - observer_.velocity();
-  const double a_c = (next.velocity - now.velocity) / kDriveLoopTime;
-  const double force = kp_ * error + integral_ + servo_.acceleration_ff * inertia_ * a_c;
-  const double limited = std::clamp(force, -servo_.force_limit, servo_.force_limit);
-  if (force == limited) integral_ += kp_ / servo_.integral_time * error * kDriveLoopTime;
+template <class Real>
+Real AxisDriveOf<Real>::control(const Setpoint& now, const Setpoint& next) {
+  using std::max, std::min;
+  const Real measured = encoder(feedback_ == ServoParams::Feedback::motor ? x_motor_ : x_load_);
+  const Real v_ref = servo_.kv * (now.position - measured) + servo_.velocity_ff * now.velocity;
+  const Real error = v_ref - observer_.velocity();
+  const Real a_c = (next.velocity - now.velocity) / kDriveLoopTime;
+  const Real force = kp_ * error + integral_ + servo_.acceleration_ff * inertia_ * a_c;
+  const Real limited = min(max(force, -servo_.force_limit), servo_.force_limit);
+  integral_ = choose(force == limited,
+                     integral_ + kp_ / servo_.integral_time * error * kDriveLoopTime, integral_);
   return limited;
 }
 
 /// What the sampled controller's force is on average over the current plant step.
-double AxisDrive::force_demanded() const {
+template <class Real>
+Real AxisDriveOf<Real>::force_demanded() const {
   return sampled_->force(loop_ * kDriveLoopTime + plant_step_ * kPlantTime, kPlantTime);
 }
 
-void AxisDrive::move_plant() {
-  double force = force_;
-  if (!motor_.empty()) {
-    MotorForcePort::Signal<double> signal{force};
-    motor_.step(signal, {.moment = moment(kPlantTime, kPlantStepsPerLoop, plant_step_),
-                         .position = x_motor_,
-                         .velocity = v_motor_,
-                         .travel_per_turn = declared_.travel_per_turn,
-                         .force_limit = declared_.force_limit,
-                         .axes = laws_ ? &motions_ : nullptr});
-    force = signal.force;
-  }
-  if (!load_.empty()) {
+template <class Real>
+void AxisDriveOf<Real>::move_plant() {
+  Real force = force_;
+  motor_.each_active([&](Chain<MotorForcePort>& chain, std::size_t i) {
+    MotorForcePort::Signal<double> signal{lane(force, i)};
+    chain.step(signal, {.moment = moment(kPlantTime, kPlantStepsPerLoop, plant_step_),
+                        .position = lane(x_motor_, i),
+                        .velocity = lane(v_motor_, i),
+                        .travel_per_turn = travel_per_turn_,
+                        .force_limit = force_limit_,
+                        .axes = motions(i)});
+    set_lane(force, i, signal.force);
+  });
+  load_.each_active([&](Chain<LoadForcePort>& chain, std::size_t i) {
     LoadForcePort::Signal<double> signal;
-    load_.step(signal, {moment(kPlantTime, kPlantStepsPerLoop, plant_step_), x_load_, v_load_,
-                        laws_ ? &motions_ : nullptr});
-    load_force_ = signal.force;
-  }
+    chain.step(signal, {moment(kPlantTime, kPlantStepsPerLoop, plant_step_), lane(x_load_, i),
+                        lane(v_load_, i), motions(i)});
+    set_lane(load_force_, i, signal.force);
+  });
   if (two_masses_)
     move_two_masses(force, load_force_);
   else
@@ -289,45 +379,75 @@ void AxisDrive::move_plant() {
 }
 
 /// Velocity after friction has acted for one plant step.
-double AxisDrive::rub(double v, double v_free, double inertia) {
-  if (rubbing_.empty()) return v_free;
-  FrictionTerms terms;
-  rubbing_.step(terms, {moment(kPlantTime, kPlantStepsPerLoop, plant_step_), x_load_, v, v_free});
+template <class Real>
+Real AxisDriveOf<Real>::rub(Real v, Real v_free, Real inertia) {
+  if (!rubbing_.some_active()) return v_free;
+  FrictionPort::Signal<Real> terms;
+  rubbing_.each_active([&](Chain<FrictionPort>& chain, std::size_t i) {
+    FrictionTerms signal;
+    chain.step(signal, {moment(kPlantTime, kPlantStepsPerLoop, plant_step_), lane(x_load_, i),
+                        lane(v, i), lane(v_free, i)});
+    set_lane(terms.dry, i, signal.dry);
+    set_lane(terms.viscous, i, signal.viscous);
+    set_lane(terms.stiffness, i, signal.stiffness);
+    set_lane(terms.damping, i, signal.damping);
+  });
   return friction_.step(terms, v, v_free, kPlantTime, inertia);
 }
 
-void AxisDrive::move_rigid(double force, double load_force) {
-  const double v = v_load_;
+template <class Real>
+void AxisDriveOf<Real>::move_rigid(Real force, Real load_force) {
+  const Real v = v_load_;
   v_load_ = rub(v, v + kPlantTime * (force + load_force) / plant_inertia_, plant_inertia_);
   x_load_ += 0.5 * kPlantTime * (v + v_load_);
   x_motor_ = x_load_;
   v_motor_ = v_load_;
 }
 
-void AxisDrive::move_two_masses(double force, double load_force) {
-  const double twist = x_motor_ - x_load_;
-  double spring = 0;
-  if (std::abs(twist) >= half_gap_)
-    spring =
-        stiffness_ * (twist - std::copysign(half_gap_, twist)) + damping_ * (v_motor_ - v_load_);
-  const double load = actual_.load;
+template <class Real>
+void AxisDriveOf<Real>::move_two_masses(Real force, Real load_force) {
+  using std::abs, std::copysign;
+  const Real twist = x_motor_ - x_load_;
+  Real spring{};
+  if (const auto taut = abs(twist) >= half_gap_; any(taut))
+    spring = choose(
+        taut, stiffness_ * (twist - copysign(half_gap_, twist)) + damping_ * (v_motor_ - v_load_),
+        Real(0));
   v_motor_ += kPlantTime * (force - spring) / motor_inertia_;
-  v_load_ = rub(v_load_, v_load_ + kPlantTime * (spring + load_force) / load, load);
+  v_load_ =
+      rub(v_load_, v_load_ + kPlantTime * (spring + load_force) / load_inertia_, load_inertia_);
   x_motor_ += kPlantTime * v_motor_;
   x_load_ += kPlantTime * v_load_;
 }
 
 /// Where the tool centre is along the axis at the end of a loop step.
-double AxisDrive::displaced(double velocity_before) {
+template <class Real>
+Real AxisDriveOf<Real>::displaced(Real velocity_before) {
   a_load_ = (v_load_ - velocity_before) / kDriveLoopTime;
-  if (displacing_.empty()) return x_load_;
+  if constexpr (kLanesOf<Real> == 1) {
+    if (watched_)
+      (*watched_)[static_cast<std::size_t>(loop_)] = {
+          {x_load_, v_load_, a_load_}, load_inertia_ * a_load_ + friction_.force() - load_force_};
+  }
+  if (!displacing_.some_active()) return x_load_;
   if (laws_) update_motions(1);
-  DisplacementPort::Signal<double> signal;
-  displacing_.step(signal, {.moment = moment(kDriveLoopTime, 1, 1),
-                            .load = {x_load_, v_load_, a_load_},
-                            .force = actual_.load * a_load_ + friction_.force() - load_force_,
-                            .axes = laws_ ? &motions_ : nullptr});
-  return x_load_ + signal.displacement;
+  Real truth = x_load_;
+  const Real force = load_inertia_ * a_load_ + friction_.force() - load_force_;
+  displacing_.each_active([&](Chain<DisplacementPort>& chain, std::size_t i) {
+    if (loop_ < first_truth_ && !displacing_.remembers(i)) return;
+    DisplacementPort::Signal<double> signal;
+    chain.step(signal, {.moment = moment(kDriveLoopTime, 1, 1),
+                        .load = {lane(x_load_, i), lane(v_load_, i), lane(a_load_, i)},
+                        .force = lane(force, i),
+                        .axes = motions(i)});
+    set_lane(truth, i, lane(x_load_, i) + signal.displacement);
+  });
+  return truth;
 }
+
+template class VelocityObserverOf<double>;
+template class VelocityObserverOf<Lanes>;
+template class AxisDriveOf<double>;
+template class AxisDriveOf<Lanes>;
 
 }  // namespace vcnc

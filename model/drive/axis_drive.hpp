@@ -37,6 +37,9 @@
 // counts, and what the tool centre is off the scale (true position = load + displacement). The
 // controller knows the declared masses; the plant has the actual ones.
 //
+// Several variants of an axis can be stepped side by side (AxisDriveLanes); each comes to the same
+// bits as alone.
+//
 // Valid below about half the loop rate. Not modelled: current ripple, cross-coupling of the plants.
 // Source: Gross, Hamann, Wiegaertner, Electrical Feed Drives in Automation; Altintas et al., CIRP
 // Annals 60/2 (2011) 779; observer gains: the critically damped g-h-k filter of Brookner, Tracking
@@ -46,8 +49,12 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "model/drive/friction.hpp"
+#include "model/drive/lanes.hpp"
 #include "model/drive/sampled_controller.hpp"
 #include "model/effects/chain.hpp"
 #include "model/machine.hpp"
@@ -60,47 +67,112 @@ inline constexpr int kPlantStepsPerLoop = 2;
 inline constexpr double kPlantTime = kDriveLoopTime / kPlantStepsPerLoop;
 
 /// Bus set-point: where the axis shall be at the end of a cycle, and how fast.
-struct AxisSetpoint {
-  double position = 0, velocity = 0;
+template <class Real>
+struct AxisSetpointOf {
+  Real position{}, velocity{};
 };
+using AxisSetpoint = AxisSetpointOf<double>;
 
 /// What one cycle of the drive brought about.
-struct AxisCycle {
-  double measured = 0;  ///< position by the measuring system at the end of the cycle
-  double second = 0;    ///< load side minus motor side at the end of the cycle
-  double force = 0;     ///< drive force at the end (sampled: demanded), share of the limit
-  double velocity = 0;  ///< measured velocity at the end
-  std::array<double, kDriveLoopSteps> truth{};  ///< true load position at the end of each loop step
+template <class Real>
+struct AxisCycleOf {
+  Real measured{};  ///< position by the measuring system at the end of the cycle
+  Real second{};    ///< load side minus motor side at the end of the cycle
+  Real force{};     ///< drive force at the end (sampled: demanded), share of the limit
+  Real velocity{};  ///< measured velocity at the end
+  std::array<Real, kDriveLoopSteps> truth{};  ///< true load position at the end of each loop step
+};
+using AxisCycle = AxisCycleOf<double>;
+
+/// What displaces the tool centre depends on: DisplacementPort at the end of a loop step.
+struct LoadMotion {
+  Motion<double> load;
+  double force = 0;
 };
 
 /// Estimates the motor's velocity from its position and the drive force.
-class VelocityObserver {
+template <class Real>
+class VelocityObserverOf {
  public:
-  VelocityObserver(double bandwidth, double inertia, double position);
+  VelocityObserverOf() = default;
+  VelocityObserverOf(double bandwidth, double inertia, double position);
   /// One loop step: `force` acted during it, `position` was measured at its end.
-  void step(double force, double position);
-  double velocity() const { return velocity_; }
+  void step(Real force, Real position);
+  Real velocity() const { return velocity_; }
+
+  /// All numbers, to be gathered in lanes.
+  auto numbers() {
+    return std::tie(inverse_inertia_, gain_position_, gain_velocity_, gain_disturbance_, position_,
+                    velocity_, disturbance_);
+  }
 
  private:
-  double inverse_inertia_, gain_position_, gain_velocity_, gain_disturbance_;
-  double position_, velocity_ = 0, disturbance_ = 0;
+  Real inverse_inertia_{}, gain_position_{}, gain_velocity_{}, gain_disturbance_{};
+  Real position_{}, velocity_{}, disturbance_{};
+};
+using VelocityObserver = VelocityObserverOf<double>;
+
+/// The chain of every lane at a port.
+template <class Real, class Port>
+class ChainsOf {
+ public:
+  void set(std::size_t lane, Chain<Port> chain) {
+    some_active_ = some_active_ || !chain.empty();
+    remembers_[lane] = chain.remembers();
+    chains_[lane] = std::move(chain);
+  }
+  Chain<Port>& chain(std::size_t lane) { return chains_[lane]; }
+  bool some_active() const { return some_active_; }
+  /// Whether its effects depend on what was before.
+  bool remembers(std::size_t lane) const { return remembers_[lane]; }
+  /// Calls f(chain, lane) for those that have effects.
+  template <class F>
+  void each_active(F&& f) {
+    if (!some_active_) return;
+    for (std::size_t i = 0; i < chains_.size(); ++i)
+      if (!chains_[i].empty()) f(chains_[i], i);
+  }
+
+ private:
+  PerLane<Real, Chain<Port>> chains_;
+  PerLane<Real, bool> remembers_{};
+  bool some_active_ = false;
 };
 
-class AxisDrive {
+/// Real: double, or Lanes for several axes at a time.
+template <class Real>
+class AxisDriveOf {
  public:
+  using Setpoint = AxisSetpointOf<Real>;
+  using Cycle = AxisCycleOf<Real>;
+
   /// One axis of a machine with its effects, laws and deviations; `seed` of all noise.
   /// Throws std::invalid_argument naming the key when wind-up or backlash lack a motor inertia.
-  AxisDrive(const Machine& machine, std::size_t axis, std::uint64_t seed);
+  AxisDriveOf(const Machine& machine, std::size_t axis, std::uint64_t seed);
   /// A linear axis on its own, as declared.
-  explicit AxisDrive(const AxisParams& params, const AxisEffects& effects = {});
+  explicit AxisDriveOf(const AxisParams& params, const AxisEffects& effects = {});
+  /// Drives that have not moved yet and that suit each other, one per lane; where there are fewer,
+  /// the further lanes go without effects. At least one.
+  explicit AxisDriveOf(std::vector<AxisDriveOf<double>> drives);
+
+  /// Whether two drives of one axis can be stepped side by side.
+  bool suits(const AxisDriveOf& other) const;
+
+  /// Leaves out what displaces the tool centre in the first loop steps of every cycle, where that
+  /// changes nothing later: their truth is where the load is.
+  void skip_early_truth(int steps) { first_truth_ = steps; }
+
+  /// Tells the motion of the load at the end of every loop step of a cycle, from now on (of one
+  /// axis alone).
+  void watch(std::array<LoadMotion, kDriveLoopSteps>& load) { watched_ = &load; }
 
   /// Follows the set-point through one bus cycle (closed loop).
-  AxisCycle follow(const AxisSetpoint& target);
+  Cycle follow(const Setpoint& target);
   /// Quick stop: brakes with `deceleration` [m/s^2 or rad/s^2] along its own ramp for one cycle.
-  AxisCycle brake(double deceleration);
+  Cycle brake(double deceleration);
   /// Holds the last commanded position with the loop closed (also before the first set-point); a
   /// commanded velocity drops to zero at once.
-  AxisCycle hold();
+  Cycle hold();
 
   /// Commanded positions and velocities of all axes for the end of the coming cycle: what a law of
   /// this axis may know of the others. Call it before follow().
@@ -114,65 +186,91 @@ class AxisDrive {
   void shift_encoder(double by) { encoder_shift_ = by; }
 
   bool standing() const;  ///< commanded and measured velocity are (nearly) zero
-  double position() const { return setpoint_.position; }
+  Real position() const { return setpoint_.position; }
 
  private:
+  template <class Other>
+  friend class AxisDriveOf;
   /// Set-points at the loop instants of a cycle, its beginning and its end included.
-  using Course = std::array<AxisSetpoint, kDriveLoopSteps + 1>;
+  using Course = std::array<Setpoint, kDriveLoopSteps + 1>;
+  template <class Port>
+  using Chains = ChainsOf<Real, Port>;
 
-  AxisDrive(const AxisParams& declared, const AxisParams& actual, const Effects& effects,
-            std::size_t axis, std::uint64_t seed);
-  void couple(const TransmissionPort::Signal<double>& transmission);
-  AxisCycle run(const Course& course);
-  AxisSetpoint shaped(const AxisSetpoint& setpoint, double acceleration, int step);
-  double control(const AxisSetpoint& now, const AxisSetpoint& next);
-  double force_demanded() const;
+  AxisDriveOf(const AxisParams& declared, const AxisParams& actual, const Effects& effects,
+              std::size_t axis, std::uint64_t seed);
+  void couple(const TransmissionPort::Signal<double>& transmission, double load);
+  Cycle run(const Course& course);
+  void shape(Setpoint& setpoint, Real acceleration, int step);
+  Real control(const Setpoint& now, const Setpoint& next);
+  Real force_demanded() const;
   void move_plant();
-  void move_rigid(double force, double load_force);
-  void move_two_masses(double force, double load_force);
-  double rub(double v, double v_free, double inertia);
-  double displaced(double velocity_before);
-  double encoder(double position);
+  void move_rigid(Real force, Real load_force);
+  void move_two_masses(Real force, Real load_force);
+  Real rub(Real v, Real v_free, Real inertia);
+  Real displaced(Real velocity_before);
+  Real encoder(Real position);
   Moment moment(double dt, int steps_per_loop, int step) const;
   void update_motions(int steps_ahead);
+  const Motions<double>* motions(std::size_t lane) const {
+    return laws_ ? &motions_[lane] : nullptr;
+  }
 
   std::size_t axis_;
   ServoParams::Feedback feedback_;
-  MechanicsParams declared_, actual_;
-  AxisSetpoint setpoint_;
+  double travel_per_turn_, force_limit_;  ///< declared
+  Setpoint setpoint_;
 
   // Constants of the loops and the plant.
-  double inertia_;  ///< what the controller takes it to be
-  double plant_inertia_, motor_inertia_;
-  ServoPort::Signal<double> servo_;
-  double kp_, lag_share_;
+  Real inertia_;  ///< what the controller takes it to be
+  Real plant_inertia_, motor_inertia_, load_inertia_;
+  ServoPort::Signal<Real> servo_;
+  Real kp_{}, lag_share_{};
   bool two_masses_ = false;
-  double stiffness_ = 0, damping_ = 0, half_gap_ = 0;
+  Real stiffness_{}, damping_{}, half_gap_{};
 
   // Effects.
-  Chain<ReceptionPort> reception_;
-  Chain<SetpointPort> shaping_;
-  Chain<EncoderPort> counting_;
-  Chain<MotorForcePort> motor_;
-  Chain<LoadForcePort> load_;
-  Chain<FrictionPort> rubbing_;
-  Chain<DisplacementPort> displacing_;
+  Chains<ReceptionPort> reception_;
+  Chains<SetpointPort> shaping_;
+  Chains<EncoderPort> counting_;
+  Chains<MotorForcePort> motor_;
+  Chains<LoadForcePort> load_;
+  Chains<FrictionPort> rubbing_;
+  Chains<DisplacementPort> displacing_;
   bool laws_;          ///< some law needs motions_
   bool told_ = false;  ///< tell_commands() was called
 
   // State.
   std::int64_t cycle_ = 0;
-  int loop_ = 0;  ///< within the cycle
+  std::array<LoadMotion, kDriveLoopSteps>* watched_ = nullptr;
+  int first_truth_ = 0;  ///< loop step whose truth is wanted in full
+  int loop_ = 0;         ///< within the cycle
   int plant_step_ = 0;
   double encoder_shift_ = 0;
-  double x_load_, v_load_ = 0, a_load_ = 0, x_motor_, v_motor_ = 0;
-  double force_ref_ = 0, force_ = 0, integral_ = 0, load_force_ = 0;
-  AxisSetpoint last_raw_, last_shaped_;
+  Real x_load_, v_load_{}, a_load_{}, x_motor_, v_motor_{};
+  Real force_ref_{}, force_{}, integral_{}, load_force_{};
+  Setpoint last_raw_, last_shaped_;
   AxisVector told_position_{}, told_velocity_{}, before_position_{}, before_velocity_{};
-  Motions<double> motions_{};
-  Friction friction_;
-  VelocityObserver observer_;
-  std::optional<SampledController> sampled_;  ///< in place of the cascade
+  PerLane<Real, Motions<double>> motions_{};
+  FrictionOf<Real> friction_;
+  VelocityObserverOf<Real> observer_;
+  std::optional<SampledController> sampled_;  ///< in place of the cascade; never in lanes
+
+  auto numbers() {
+    return std::tuple_cat(
+        std::tie(setpoint_.position, setpoint_.velocity, inertia_, plant_inertia_, motor_inertia_,
+                 load_inertia_, servo_.kv, servo_.velocity_gain, servo_.integral_time,
+                 servo_.velocity_ff, servo_.acceleration_ff, servo_.current_lag, servo_.force_limit,
+                 kp_, lag_share_, stiffness_, damping_, half_gap_, x_load_, x_motor_,
+                 last_raw_.position, last_raw_.velocity, last_shaped_.position,
+                 last_shaped_.velocity),
+        observer_.numbers());
+  }
 };
+
+using AxisDrive = AxisDriveOf<double>;
+using AxisDriveLanes = AxisDriveOf<Lanes>;
+
+extern template class AxisDriveOf<double>;
+extern template class AxisDriveOf<Lanes>;
 
 }  // namespace vcnc

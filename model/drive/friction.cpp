@@ -5,25 +5,34 @@
 
 namespace vcnc {
 
-double Friction::step(const FrictionTerms& terms, double v, double v_free, double dt,
-                      double inertia) {
-  const double mobility = dt / inertia;
-  double v1 = 0;
-  if (terms.stiffness > 0 && terms.dry > 0) {
-    const double shrink = 1 / (1 + terms.stiffness * std::abs(v) * dt / terms.dry);
+template <class Real>
+Real FrictionOf<Real>::step(const FrictionPort::Signal<Real>& terms, Real v, Real v_free, double dt,
+                            Real inertia) {
+  using std::abs, std::copysign, std::max;
+  const Real mobility = dt / inertia;
+  const auto dry_and_stiff = choose(terms.dry > Real(0), terms.stiffness, Real(0));
+  const auto bristly = dry_and_stiff > Real(0);
+  Real v1{}, bristle{};
+  if (any(bristly)) {
+    const Real shrink = 1.0 / (1.0 + terms.stiffness * abs(v) * dt / terms.dry);
     // F_f = at_rest + slope * v1
-    const double at_rest =
-        bristle_ * (terms.stiffness * shrink + terms.damping * (shrink - 1) / dt);
-    const double slope = (terms.stiffness * dt + terms.damping) * shrink + terms.viscous;
-    v1 = (v_free - mobility * at_rest) / (1 + mobility * slope);
-    bristle_ = (bristle_ + dt * v1) * shrink;
-  } else {
-    const double left = std::max(std::abs(v_free) - mobility * terms.dry, 0.0);
-    v1 = std::copysign(left / (1 + mobility * terms.viscous), v_free);
-    bristle_ = 0;
+    const Real at_rest =
+        bristle_ * (terms.stiffness * shrink + terms.damping * (shrink - 1.0) / dt);
+    const Real slope = (terms.stiffness * dt + terms.damping) * shrink + terms.viscous;
+    v1 = (v_free - mobility * at_rest) / (1.0 + mobility * slope);
+    bristle = (bristle_ + dt * v1) * shrink;
   }
+  if (!all(bristly)) {
+    const Real left = max(abs(v_free) - mobility * terms.dry, Real(0));
+    v1 = choose(bristly, v1, copysign(left / (1.0 + mobility * terms.viscous), v_free));
+    bristle = choose(bristly, bristle, Real(0));
+  }
+  bristle_ = bristle;
   force_ = (v_free - v1) / mobility;
   return v1;
 }
+
+template class FrictionOf<double>;
+template class FrictionOf<Lanes>;
 
 }  // namespace vcnc

@@ -18,23 +18,28 @@
 // al., Automatica 30 (1994) 1083.
 #pragma once
 
+#include "model/drive/lanes.hpp"
 #include "model/effects/ports.hpp"
 
 namespace vcnc {
 
 using FrictionTerms = FrictionPort::Signal<double>;
 
-class Friction {
+/// Real: double, or Lanes for several axes at a time.
+template <class Real>
+class FrictionOf {
  public:
   /// Velocity at the end of a step from `v`, when without friction it would be `v_free`.
-  double step(const FrictionTerms& terms, double v, double v_free, double dt, double inertia);
+  Real step(const FrictionPort::Signal<Real>& terms, Real v, Real v_free, double dt, Real inertia);
 
   /// Friction force over the last step, positive against positive motion.
-  double force() const { return force_; }
+  Real force() const { return force_; }
 
  private:
-  double bristle_ = 0;  ///< z
-  double force_ = 0;
+  Real bristle_{};  ///< z
+  Real force_{};
 };
+
+using Friction = FrictionOf<double>;
 
 }  // namespace vcnc

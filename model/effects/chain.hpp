@@ -49,6 +49,13 @@ class Chain {
 
   bool empty() const { return stages_.empty(); }
 
+  /// Whether some effect depends on what was before.
+  bool remembers() const {
+    for (const auto& stage : stages_)
+      if (stage->remembers()) return true;
+    return false;
+  }
+
   void step(Signal& signal, const Context& context) {
     for (const auto& stage : stages_) stage->step(signal, context);
   }
@@ -64,12 +71,16 @@ class Chain {
   struct Stage {
     virtual ~Stage() = default;
     virtual void step(Signal&, const Context&) = 0;
+    virtual bool remembers() const = 0;
   };
   template <class Effect>
   struct EffectStage final : Stage {
     EffectStage(const Effect& e, const Seat& s) : effect(e), seat(s) {}
     void step(Signal& signal, const Context& context) override {
       step_effect<double>(effect, signal, context, state, seat);
+    }
+    bool remembers() const override {
+      return !std::is_same_v<EffectState<Effect, double>, NoState>;
     }
     Effect effect;
     Seat seat;
@@ -78,6 +89,7 @@ class Chain {
   struct LawStage final : Stage {
     explicit LawStage(const Law& l) : law(l) {}
     void step(Signal& signal, const Context& context) override { apply_law(law, signal, context); }
+    bool remembers() const override { return false; }
     Law law;
   };
 

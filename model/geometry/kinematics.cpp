@@ -20,6 +20,13 @@ Mat3 rot_vector(const Vec3& t) {
   return Eigen::AngleAxisd(angle, t / angle).toRotationMatrix();
 }
 
+/// A rotation about a line that is tilted by t.
+Mat3 about_tilted(const Mat3& R, const Vec3& t) {
+  if (t.isZero(0)) return R;
+  const Mat3 tilt = rot_vector(t);
+  return tilt * R * tilt.transpose();
+}
+
 }  // namespace
 
 Kinematics::Kinematics(const KinematicsParams& params, double tool_length, const Vec3& p_MW)
@@ -62,9 +69,8 @@ ToolPose Kinematics::forward(const AxisVector& q) const {
 ToolPose Kinematics::forward(const AxisVector& q, const GeometryErrors<double>& e) const {
   const RotaryPair iso = counted({q[kA], q[kC]});
   const KinematicsParams& k = params_;
-  const Mat3 T_A = rot_vector(e.a_tilt), T_C = rot_vector(e.c_tilt);
-  const Mat3 Rx = T_A * rot_x(iso.a) * T_A.transpose();
-  const Mat3 Rz = T_C * rot_z(iso.c) * T_C.transpose();
+  const Mat3 Rx = about_tilted(rot_x(iso.a), e.a_tilt);
+  const Mat3 Rz = about_tilted(rot_z(iso.c), e.c_tilt);
   const Mat3 turn = rot_vector(e.tool_turn);
   const Vec3 longer = e.tool_longer * (turn * Vec3::UnitZ());
   const Vec3 p_M = Vec3(q[kX], q[kY], q[kZ] - tool_length_) + e.tip;

@@ -1,6 +1,7 @@
 // The planner on programs that are hard to plan: cutting time against the shortest possible without
-// jerk limits on the same path (tests/bench/time_bound.hpp), use of the limits, deviation of the
-// tip, planning time.
+// jerk limits on the same path (time_bound.hpp) and, of lines and arcs of X, Y, Z, with them on any
+// path within the tolerance (jerk_bound.hpp), use of the limits, deviation of the tip, planning
+// time.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include "bus/tick.hpp"
 #include "controller/limit_use.hpp"
 #include "controller/planner.hpp"
+#include "tests/bench/jerk_bound.hpp"
 #include "tests/bench/plan_programs.hpp"
 #include "tests/bench/time_bound.hpp"
 #include "tests/controller/program_file.hpp"
@@ -70,6 +72,7 @@ void measure(const PlanProgram& program, const Machine& machine, NcParams::Dynam
   fmt::print("{:<20}{:9.3f}{:9.3f}{:7.2f}   {:5.3f} {:5.3f} {:5.3f}{:9.3f}{:10.4f}", program.name,
              run.duration(), bound, run.duration() / bound, use.largest(1), use.largest(2),
              use.largest(3), off * 1e6, planning_s / run.duration());
+  if (!run.path().frame().rtcp) fmt::print("{:10.3f}", jerk_bound(moves, machine));
   if (program.corners)
     fmt::print("{:10.3f}{:10.3f}", trapezoid_time(moves, machine),
                time_with_stops(moves, machine, true));
@@ -79,16 +82,21 @@ void measure(const PlanProgram& program, const Machine& machine, NcParams::Dynam
 
 void measure_all(const char* title, const std::vector<PlanProgram>& programs,
                  const Machine& machine, NcParams::Dynamics dynamics) {
-  fmt::print("{}\n{:<20}{:>9}{:>9}{:>7}   {:<17}{:>9}{:>10}{:>10}{:>10}\n", title, "", "time s",
-             "bound s", "ratio", "use of v, a, j", "off um", "plan s/s", "trapez. s", "stops s");
+  fmt::print("{}\n{:<20}{:>9}{:>9}{:>7}   {:<17}{:>9}{:>10}{:>10}{:>10}{:>10}\n", title, "",
+             "time s", "bound s", "ratio", "use of v, a, j", "off um", "plan s/s", "jerk b. s",
+             "trapez. s", "stops s");
   for (const PlanProgram& program : programs)
     if (!only || program.name.find(only) != std::string::npos) measure(program, machine, dynamics);
 }
 
-/// The three-axis set as files, for another planner.
+/// The three-axis set as files, for another planner, each with the least time of any planner [s].
 void write_programs(const std::string& folder) {
-  for (const PlanProgram& program : three_axis_programs())
-    std::ofstream(folder + "/" + program.name + ".ngc") << program.text;
+  const Machine machine = three_axis_machine();
+  for (const PlanProgram& program : three_axis_programs()) {
+    const std::string file = folder + "/" + program.name;
+    std::ofstream(file + ".ngc") << program.text;
+    std::ofstream(file + ".bound") << jerk_bound(read_moves(program.text, machine), machine);
+  }
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ std::vector<GridPoint> grid_of(const Path& path, const FrameMap& map, const Moti
     GridPoint& g = grid.emplace_back();
     g.s = s;
     g.d1 = axis_point(map, point).dq;
-    const double e = 0.1 * std::min(path.half_width(s) / steps_per_width, kLargestStep);
+    const double e = 0.1 * std::min(path.detail(s) / steps_per_width, kLargestStep);
     const double a = std::max(0.0, s - e), b = std::min(length, s + e);
     g.d2 = (axis_point(map, path.eval(b)).dq - axis_point(map, path.eval(a)).dq) / (b - a);
     g.b_max = std::pow(feed_limit(path, s, point.dx), 2);
@@ -56,7 +56,7 @@ std::vector<GridPoint> grid_of(const Path& path, const FrameMap& map, const Moti
         g.b_max = std::min(g.b_max, std::pow(limits.velocity[i] / g.d1[i], 2));
     if (s >= length) break;
     const double step =
-        std::min({path.half_width(s) / steps_per_width, kLargestStep, length / kFewestSteps});
+        std::min({path.detail(s) / steps_per_width, kLargestStep, length / kFewestSteps});
     s = length - s < 1.5 * step ? length : s + step;
   }
   return grid;

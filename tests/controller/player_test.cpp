@@ -447,5 +447,32 @@ TEST(Player, SaysDoneAgainAndAgain) {
   EXPECT_EQ(step.velocity, AxisVector{});
 }
 
+/// G96: the spindle follows the distance of X from its axis, and a feed per turn follows both, at
+/// most by the way between two nodes of the plan (1 mm) late where it rises.
+TEST(Player, TheSurfaceSpeedIsKeptWhileXMoves) {
+  Machine machine = machine_of("trunnion");
+  machine.probe.in_spindle = false;
+  const auto steps =
+      play("G54 G0 X100\nG96 S150 D1500 M3\nG95 F0.1 G1 X12 G61\nG97\nG0 X60\nM30\n", machine);
+  constexpr double kPiece = 0.011, kNode = 1.1e-3;  // half a step of the pieces' speed; [m]
+  const double v = 150.0 / 60, most = 1500 * 2 * kPi / 60, per_turn = 0.1e-3 / (2 * kPi);
+  bool limited = false;
+  for (const PlayerStep& step : steps) {
+    if (step.line == 5 && !step.dwell) {
+      EXPECT_NEAR(step.spindle_speed, most, 1e-9) << "G97 keeps it";
+    }
+    if (step.line != 3 || step.feed == 0) continue;
+    const double x = step.tip.x(), n = std::min(v / x, most);
+    ASSERT_NEAR(step.spindle_speed, n, 1e-9) << x;
+    limited = limited || n == most;
+    ASSERT_LT(step.feed, (1 + kPiece) * per_turn * n) << x;
+    if (x > 97e-3 || x < 13.5e-3) continue;  // speeding up and braking
+    const double late = std::min(v / (x + kNode), most);
+    ASSERT_GT(step.feed, (1 - kPiece) * per_turn * late) << x;
+  }
+  EXPECT_TRUE(limited) << "within 15.9 mm of the axis";
+  EXPECT_EQ(steps.back().spindle_speed, 0);
+}
+
 }  // namespace
 }  // namespace vcnc

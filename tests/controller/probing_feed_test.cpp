@@ -58,7 +58,7 @@ TEST(ProbingFeed, TheAllowedFeedIsAllowedAndNoMore) {
     const std::string message = refusal(program(c.feed), machine);
     EXPECT_NE(message.find("is too fast for the probe"), std::string::npos) << c.move << message;
     EXPECT_NE(message.find(c.reason), std::string::npos) << message;
-    EXPECT_NE(message.find(c.before[0] ? ":3: F" : ":2: F"), std::string::npos) << message;
+    EXPECT_NE(message.find(c.before[0] ? ":3:1: F" : ":2:1: F"), std::string::npos) << message;
     const double feed = allowed(message);
     ASSERT_GT(feed, 0) << message;
     EXPECT_EQ(refusal(program(feed), machine), "") << c.move;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
 #include <set>
 #include <tuple>
@@ -15,7 +16,7 @@ namespace {
 
 Diagnosis diagnosed(const Record& record, const Machine& declared = {}) {
   toy::ToyReplica replica(record);
-  return diagnose({record, replica, declared, toy::candidates()}, std::nullopt);
+  return diagnose({record, replica, declared, toy::candidates()});
 }
 
 Record measured(const Machine& truth, std::uint64_t seed) {
@@ -94,7 +95,7 @@ TEST(Diagnose, PutsBackNumbersThatAreNotNeeded) {
   move_number(truth, "effects.X.scale_error.error_ppm", 80);
   const Record record = measured(truth, 32);
   toy::ToyReplica replica(record);
-  const Diagnosis d = diagnose({record, replica, Machine(), all}, std::nullopt);
+  const Diagnosis d = diagnose({record, replica, Machine(), all});
   ASSERT_EQ(d.effects.size(), 1U);
   ASSERT_EQ(d.effects[0].numbers.size(), 1U);
   EXPECT_EQ(d.effects[0].numbers[0].key, "effects.X.scale_error.error_ppm");
@@ -152,7 +153,7 @@ TEST(Diagnose, NamesProgramsThatThereAre) {
     all.push_back({name, "Z", {{"effects.Z.backlash.gap_um", 5, 0, 1000, true}}, {}});
   const Record record = measured(truth, 34);
   toy::ToyReplica replica(record);
-  const Diagnosis d = diagnose({record, replica, truth, all}, std::nullopt);
+  const Diagnosis d = diagnose({record, replica, truth, all});
   std::size_t named = 0;
   for (const Excitation& e : d.excitation) {
     if (e.program.empty()) continue;
@@ -178,15 +179,28 @@ TEST(Diagnose, ReferenceRunCancelsWhatTheModelGetsWrong) {
                well = wrong(measured({}, 6));
   toy::ToyReplica of_healthy(healthy), of_sick(sick), of_well(well);
   const Machine declared;
-  const Diagnosis d =
-      diagnose({sick, of_sick, declared, toy::candidates()}, HealthyRun{healthy, of_healthy});
+  const Diagnosis d = diagnose({sick, of_sick, declared, toy::candidates()},
+                               less_healthy(sick, healthy, of_healthy, declared));
   EXPECT_TRUE(d.differential);
   EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
   ASSERT_EQ(d.effects.size(), 1U);
   EXPECT_EQ(d.effects[0].name, "squareness");
-  const Diagnosis none =
-      diagnose({well, of_well, declared, toy::candidates()}, HealthyRun{healthy, of_healthy});
+  const Diagnosis none = diagnose({well, of_well, declared, toy::candidates()},
+                                  less_healthy(well, healthy, of_healthy, declared));
   EXPECT_EQ(none.verdict, DiagnosisVerdict::no_deviation);
+}
+
+TEST(LessHealthy, HoldsAgainstThePieceAsItWasClamped) {
+  Machine clamped;
+  move_number(clamped, "effects.setup.piece_offset.shift_um.x", 15);
+  const Record healthy = measured(clamped, 41), now = measured(clamped, 42);
+  toy::ToyReplica of_healthy(healthy);
+  const DifferentialRecord difference = less_healthy(now, healthy, of_healthy, Machine());
+  EXPECT_NEAR(number_of(difference.healthy, "effects.setup.piece_offset.shift_um.x"), 15, 0.05);
+  EXPECT_NEAR(difference.off[0], 0.5 * toy::kProbeNoise, 0.1 * toy::kProbeNoise);  // of 4 laps
+  // No reading is left out because the piece is not where it is declared to be.
+  const std::vector<double>& reading = difference.record.find(SignalKind::deflection, 0)->value;
+  EXPECT_TRUE(std::all_of(reading.begin(), reading.end(), [](double v) { return v == v; }));
 }
 
 TEST(Diagnose, AttributesNothingToLapsShuffledBetweenConditions) {
@@ -225,7 +239,7 @@ TEST(Diagnose, KeepsWhatWasFoundWhenInterrupted) {
   const Record record = measured(truth, 8);
   toy::ToyReplica replica(record);
   const Machine declared;
-  const Diagnosis d = diagnose({record, replica, declared, toy::candidates()}, std::nullopt, {},
+  const Diagnosis d = diagnose({record, replica, declared, toy::candidates()}, {},
                                [](const DiagnosisProgress&) { return false; });
   ASSERT_FALSE(d.warnings.empty());
   EXPECT_NE(d.warnings.back().find("Interrupted"), std::string::npos);

@@ -114,6 +114,23 @@ TEST(Screening, DetectionLimitIsFiveStandardDeviations) {
               0.05 * 5 / std::sqrt(sum) * 1e3);
 }
 
+TEST(Trials, ALimitIsTriedWholeAtEveryValue) {
+  const Candidate clip{
+      "range_clip", "probe", {{"effects.probe.range_clip.limit_mm", 0.4, 0, 50, true}}, {}};
+  const std::vector<Trial> all = trials(Machine(), {clip}, [](const Candidate&, std::size_t) {
+    return std::vector<double>{0.3, 0.49};
+  });
+  ASSERT_EQ(all.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double value = i == 0 ? 0.3 : 0.49;
+    ASSERT_EQ(all[i].directions.size(), 1U);
+    const Machine tried = machine_of(Machine(), clip, all[i], all[i].directions[0]);
+    EXPECT_DOUBLE_EQ(number_of(tried, "effects.probe.range_clip.limit_mm"), value);
+    // However much of it the residual holds: half a limit is no smaller effect.
+    EXPECT_DOUBLE_EQ(start_of(clip, all[i], Eigen::VectorXd::Constant(1, 0.02))[0].value, value);
+  }
+}
+
 TEST(Intervals, CoverTheTruthAsOftenAsTheySay) {
   const std::vector<Candidate> all = toy::candidates();
   int inside = 0, numbers = 0;

@@ -55,6 +55,33 @@ TEST(MachineReplica, MemoryChangesNothing) {
       EXPECT_TRUE(same_bits(replica.predict(machine), run.replica().predict(machine)));
 }
 
+TEST(MachineReplica, SeveralAtATimeAreAsAlone) {
+  const RecordedRun& run = reversals();
+  const MachineReplica replica = run.replica();
+  std::vector<Machine> all = hypotheses(run.declared);
+  const auto on_x = [&](auto effect) {
+    all.push_back(run.declared);
+    all.back().effects.axis[kX].get<decltype(effect)>() = effect;
+  };
+  on_x(Viscous::nominal(false));
+  on_x(Cogging::nominal(false));
+  on_x(KvError::nominal(false));
+  on_x(EncoderSubdivision::nominal(false));
+  on_x(CommandDelay::nominal(false));
+  on_x(BusLatency{.cycles = 2});
+  on_x(Backlash::nominal(false));
+  on_x(Windup::nominal(false));
+  on_x(PitchPeriodic::nominal(false));  // move the tool centre, not the drive
+  on_x(ThermalDrift::nominal(false));
+  on_x(LoadPlay::nominal(false));  // remembers
+  all.push_back(all.front());
+  all.back().effects.get<ContactLoss>() = ContactLoss::nominal();  // needs the probe in full
+  const std::vector<Prediction> together = replica.predict_all(all);
+  ASSERT_EQ(together.size(), all.size());
+  for (std::size_t i = 0; i < all.size(); ++i)
+    EXPECT_TRUE(same_bits(together[i], run.replica().predict(all[i]))) << i;
+}
+
 TEST(MachineReplica, ThreadsChangeNothing) {
   const RecordedRun& run = reversals();
   const MachineReplica replica = run.replica();

@@ -88,5 +88,64 @@ TEST(Selection, FindsThreeEffectsTogether) {
   EXPECT_EQ(result.found.added.size(), 3U) << names(result, toy::candidates());
 }
 
+TEST(Selection, OfEqualsTakesTheOneOfUsualSize) {
+  Record record = toy::commands(1000, 4);
+  Machine truth;
+  move_number(truth, "effects.X.load_play.width_um", 1);
+  toy::measure(record, truth, 12);
+  toy::ToyReplica replica(record);
+  const Machine declared;
+  std::vector<Candidate> all = toy::candidates();
+  Candidate odd = *std::find_if(all.begin(), all.end(),
+                                [](const Candidate& c) { return c.effect == "load_play"; });
+  odd.effect = "odd";
+  odd.numbers[0].typical /= 1000;
+  all.insert(all.begin(), odd);
+  Evidence evidence(record, replica, declared);
+  const SelectionResult result = select_effects_of(evidence, declared, all, {}, {});
+  ASSERT_EQ(result.found.added.size(), 1U);
+  EXPECT_EQ(all[result.found.added[0].candidate].effect, "load_play");
+  EXPECT_EQ(result.found.added[0].class_with, std::vector<std::size_t>{0});
+}
+
+TEST(Selection, WhatIsFoundIsNotKnownWellEnoughForAnEffectBehindIt) {
+  Record record = toy::commands(1000, 4);
+  Machine truth;
+  move_number(truth, "effects.X.load_play.width_um", 20);
+  move_number(truth, "effects.geometry.squareness.xy_urad", 6);  // 0.05 % of the chi-square
+  toy::measure(record, truth, 13);
+  toy::ToyReplica replica(record);
+  const Machine declared;
+  Evidence evidence(record, replica, declared);
+  const auto found = [&](double share) {
+    DiagnosisOptions options;
+    options.share_of_found = share;
+    return select_effects_of(evidence, declared, toy::candidates(), options, {});
+  };
+  EXPECT_EQ(names(found(1e-6), toy::candidates()), "X.load_play geometry.squareness");
+  EXPECT_EQ(names(found(0.1), toy::candidates()), "X.load_play");
+}
+
+TEST(FitDeclared, LeavesNoMoreThanTheDeclarationWhateverIsWrong) {
+  for (const double wrong : {1e-6, 1e-4, 1e-2}) {
+    Record record = toy::commands(500, 4);
+    toy::measure(record, Machine(), 14);
+    const std::vector<double>& x = record.find(SignalKind::command, 0)->value;
+    for (MeasuredSignal& s : record.signals)
+      if (is_compared(s.kind))
+        for (std::size_t k = 0; k < s.value.size(); ++k)
+          s.value[k] += wrong * (s.kind == SignalKind::force ? 1e7 : 1) * std::sin(x[k] / 0.004);
+    toy::ToyReplica replica(record);
+    const Machine declared;
+    Evidence evidence(record, replica, declared);
+    const double before =
+        evidence.chi2(evidence.residual(evidence.predict(declared)), Role::fitted);
+    const FittedMachine fitted = fit_declared(evidence, declared);
+    EXPECT_LE(evidence.chi2(fitted.residual, Role::fitted), before) << wrong;
+    for (const FreedNumber& n : fitted.nuisances.numbers)
+      EXPECT_LE(std::abs(n.pull()), 20 + 1e-9) << n.number.key;
+  }
+}
+
 }  // namespace
 }  // namespace vcnc

@@ -371,5 +371,47 @@ TEST(AxisDrive, SameInputsSameBits) {
   }
 }
 
+// Variants of one axis side by side, with and without bristles, with and without effects at every
+// port of the drive.
+TEST(AxisDriveLanes, ComeToTheSameBitsAsAlone) {
+  for (const bool two_masses : {false, true}) {
+    std::vector<AxisEffects> effects(kLanes);
+    std::vector<AxisParams> params;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      params.push_back(axis(40 + static_cast<double>(i), 1, 0.9));
+      if (i > 0) effects[i] = friction();
+      if (two_masses) effects[i].get<Windup>().compliance = 1e-9 * static_cast<double>(i + 1);
+    }
+    effects[2].get<Presliding>().stiffness = 2e7;
+    effects[3].get<Cogging>().amplitude = 20;
+    effects[4].get<PitchPeriodic>().amplitude = 1e-6;
+    effects[5].get<CommandDelay>() = CommandDelay::nominal(false);
+    effects[6].get<EncoderSubdivision>() = EncoderSubdivision::nominal(false);
+    effects[7].get<CableChain>() = CableChain::nominal(false);
+    params[1].mechanics.load *= 1.1;
+    const auto drive = [&](std::size_t i) { return AxisDrive(params[i], effects[i]); };
+    const std::size_t used = two_masses ? kLanes : kLanes - 1;  // not all need be used
+    std::vector<AxisDrive> alone, together;
+    for (std::size_t i = 0; i < used; ++i) {
+      alone.push_back(drive(i));
+      together.push_back(drive(i));
+    }
+    AxisDriveLanes lanes(std::move(together));
+    for (int k = 1; k <= 1000; ++k) {
+      const double angle = 2 * kPi * k / 400;
+      const double x = 2e-3 * (1 - std::cos(angle)), v = 2e-3 * 2 * kPi / 0.4 * std::sin(angle);
+      const AxisDriveLanes::Cycle cycles = lanes.follow({x, v});
+      for (std::size_t i = 0; i < used; ++i) {
+        const AxisCycle cycle = alone[i].follow({x, v});
+        ASSERT_EQ(lane(cycles.measured, i), cycle.measured) << "lane " << i << ", cycle " << k;
+        ASSERT_EQ(lane(cycles.second, i), cycle.second) << "lane " << i << ", cycle " << k;
+        ASSERT_EQ(lane(cycles.force, i), cycle.force) << "lane " << i << ", cycle " << k;
+        for (std::size_t j = 0; j < cycle.truth.size(); ++j)
+          ASSERT_EQ(lane(cycles.truth[j], i), cycle.truth[j]) << "lane " << i << ", cycle " << k;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace vcnc

@@ -22,14 +22,14 @@ ARC_KEYS = MOTION_KEYS | {"centre", "plane", "turns"}
 # name: text, what the error has behind the file's name
 REFUSED = {
     "empty": (b"", ": the program is empty"),
-    "no end": (b"G0 X1\n", ":1: the program does not end with M2 or M30"),
-    "nul": (b"G0 X1\n\0M2\n", ":2: NUL byte"),
-    "two bytes a letter": ("G0 X1\nM2\n".encode("utf-16"), ":1: NUL byte"),
-    "long line": (b"G0 X1" + b" " * 1_000_000 + b"\nM2\n", ":1: line longer than"),
+    "no end": (b"G0 X1\n", ":1:1: the program does not end with M2 or M30"),
+    "nul": (b"G0 X1\n\0M2\n", ":2:1: NUL byte"),
+    "two bytes a letter": ("G0 X1\nM2\n".encode("utf-16"), ":1:4: NUL byte"),
+    "long line": (b"G0 X1" + b" " * 1_000_000 + b"\nM2\n", ":1:4097: line longer than"),
     "old Mac": (b"G0 X1\rM2\r", ":1:6: unexpected byte 0x0d"),
-    "calls itself": (b"o1 sub\no1 call\no1 endsub\no1 call\nM2\n", ":2: calls nested deeper than"),
-    "M98 to itself": (b"O1\nM98 P1\nM30\n", ":2: calls nested deeper than"),
-    "endless": (b"o1 while [1]\no1 endwhile\nM2\n", ":2: more than 2000000 passes"),
+    "calls itself": (b"o1 sub\no1 call\no1 endsub\no1 call\nM2\n", ":2:1: calls nested deeper than"),
+    "M98 to itself": (b"O1\nM98 P1\nM30\n", ":2:1: calls nested deeper than"),
+    "endless": (b"o1 while [1]\no1 endwhile\nM2\n", ":2:1: more than 2000000 passes"),
     "huge": (b"G0 X99999999\nM2\n", ":1:5: X: number too large: 99999999"),
     "huge value": (b"G0 X[9999999*9999999]\nM2\n", ":1:4: number too large"),
     "radius too small": (b"G1 F100 X0\nG2 X10 R4\nM2\n", ":2:8: R4 is shorter than half the chord"),
@@ -153,7 +153,7 @@ class Checks:
                     max(float(row["feed_mm_min"]) for row in rows if row["line"] == "2") < 6000, "plan", "feed")
         far = self.program(b"G0 X4000\nM2\n")
         code, _, said = self.run("plan", far, "--machine", MACHINE)
-        self.expect(code == 2 and said.startswith(f"vcnc: {far}:1: X would reach 4000.000 mm"), "plan", said)
+        self.expect(code == 2 and said.startswith(f"vcnc: {far}:1:1: X would reach 4000.000 mm"), "plan", said)
 
 
 def main():

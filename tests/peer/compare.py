@@ -11,6 +11,7 @@ differs that is not in that file, 77 when rs274 is not installed.
 import argparse
 import collections
 import concurrent.futures
+import math
 import os
 import pathlib
 import re
@@ -39,8 +40,11 @@ def read_choices(path):
 
 def compare(expected, got, text, contour):
     """None when both do the same, else a sentence. A random contour may be too narrow for the tool: then both refuse,
-    or vcnc alone where only moves that are no neighbours tell."""
+    or vcnc alone where only moves that are no neighbours tell, or where the inside corner before an arc lies behind its
+    end: rs274 then goes round nearly the whole circle, which no arc of a contour asks for."""
     if contour and got.error and (expected.error or "leaves standing" in got.error):
+        return None
+    if contour and got.error and "an arc is too short" in got.error and _goes_round(expected):
         return None
     if expected.error:
         return f"rs274 refuses ({expected.error}), vcnc {'refuses, too: ' + got.error if got.error else 'does not'}"
@@ -49,6 +53,11 @@ def compare(expected, got, text, contour):
     inches = re.search(r"G\s*20|G\[20", text, re.IGNORECASE) is not None
     return canonical.difference(expected, got, canonical.TOLERANCE_INCH_MM if inches else canonical.TOLERANCE_MM,
                                 lines=canonical.LINES_NUMBERED in text, slide=contour)
+
+
+def _goes_round(path):
+    return any(segment.kind == "arc" and abs(canonical.arc_sweep(segment, before.end)[0]) > 1.9 * math.pi
+               for before, segment in zip(path.segments, path.segments[1:]))
 
 
 def judge(rs274, vcnc, program, twin=None):
@@ -72,7 +81,7 @@ def jobs_of(folder, count, seed, only, scratch):
         if program.name.endswith(".vcnc.ngc"):
             continue
         jobs[program.name] = (program, program)
-        for ending in (".fanuc.nc", ".vcnc.ngc"):
+        for ending in (".fanuc.nc", ".siemens.nc", ".vcnc.ngc"):
             twin = program.with_name(program.stem + ending)
             if twin.exists():
                 jobs[twin.name] = (program, twin)

@@ -5,7 +5,8 @@
 
 LinuxCNC (trapezoidal planner, motmod and tpmod with three ideal axes, not in real time) plays each program; the servo
 periods from the first to the last movement are counted, so a busy host changes nothing. vcnc plans the same file with
-the same velocities and accelerations and with a jerk that LinuxCNC does not limit. 77: LinuxCNC is not installed.
+the same velocities and accelerations and with a jerk that LinuxCNC does not limit; no planner that limits it can be quicker than the bound
+(tests/bench/jerk_bound.hpp). 77: LinuxCNC is not installed.
 """
 
 import argparse
@@ -107,16 +108,20 @@ def main():
         machine = folder / "three_axes.toml"
         machine.write_text(MACHINE)
         play_on_linuxcnc(folder)
-        print(f"{'':<20}{'LinuxCNC s':>12}{'a':>7}{'j':>7}{'smooth s':>10}{'fast s':>9}{'fast / LinuxCNC':>17}")
-        peer_sum = fast_sum = 0.0
+        print(f"{'':<20}{'LinuxCNC s':>12}{'a':>7}{'j':>7}{'bound s':>9}{'bound / LinuxCNC':>18}{'smooth s':>10}{'fast s':>9}"
+              f"{'fast / bound':>14}{'fast / LinuxCNC':>17}")
+        peer_sum = fast_sum = bound_sum = 0.0
         for program in sorted(folder.glob("*.ngc")):
             samples = Samples(program.with_suffix(".samples"))
             peer = samples.time_s()
+            bound = float(program.with_suffix(".bound").read_text())
             smooth, fast = (plan(options.vcnc, machine, program, dynamics) for dynamics in ("smooth", "fast"))
             print(f"{program.stem:<20}{peer:12.3f}{samples.largest(2) / ACCELERATION:7.2f}"
-                  f"{samples.largest(3) / JERK:7.1f}{smooth:10.3f}{fast:9.3f}{fast / peer:17.3f}")
-            peer_sum, fast_sum = peer_sum + peer, fast_sum + fast
-        print(f"{'all':<20}{peer_sum:12.3f}{'':24}{fast_sum:9.3f}{fast_sum / peer_sum:17.3f}")
+                  f"{samples.largest(3) / JERK:7.1f}{bound:9.3f}{bound / peer:18.3f}{smooth:10.3f}{fast:9.3f}"
+                  f"{fast / bound:14.3f}{fast / peer:17.3f}")
+            peer_sum, fast_sum, bound_sum = peer_sum + peer, fast_sum + fast, bound_sum + bound
+        print(f"{'all':<20}{peer_sum:12.3f}{'':14}{bound_sum:9.3f}{bound_sum / peer_sum:18.3f}{'':10}{fast_sum:9.3f}"
+              f"{fast_sum / bound_sum:14.3f}{fast_sum / peer_sum:17.3f}")
         print("a, j: LinuxCNC's largest acceleration and jerk, in shares of the limits of vcnc")
         if options.keep:
             shutil.copytree(folder, options.keep, dirs_exist_ok=True)

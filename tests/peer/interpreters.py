@@ -79,6 +79,8 @@ class Vcnc:
         options = ["--block-delete"] if block_delete(program) else []
         if str(program).endswith(".fanuc.nc"):
             options += ["--dialect", "fanuc"]
+        if str(program).endswith(".siemens.nc"):
+            options += ["--dialect", "siemens"]
         return options
 
 

@@ -82,7 +82,7 @@ def judge(vcnc, rs274, program):
     if wrong is None and line != "ANY":
         wrong = _wrong_before(vcnc, program, lines[:int(line) - 1])
     too = None
-    if rs274 and not program.name.endswith(".fanuc.nc"):
+    if rs274 and not program.name.endswith((".fanuc.nc", ".siemens.nc")):
         try:
             too = rs274.run(program, 3).error is not None
         except interpreters.Timeout:
@@ -102,6 +102,8 @@ def _wrong_message(code, said, line, column, reason):
     place = _PLACE.search(said)
     if line != "ANY" and (not place or place.group(1) != line):
         return f"expected line {line}: {said}"
+    if place and not place.group(2):
+        return f"no column: {said}"
     if column and place.group(2) != column:
         return f"expected column {column}: {said}"
     message = said[place.end():] if place else said

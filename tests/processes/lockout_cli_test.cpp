@@ -104,14 +104,14 @@ TEST_F(LockoutCli, AScenarioThatCannotRunIsBadInputAndNamesItsFile) {
   write_text(scratch_ / "program.toml", head + "program = \"bad.ngc\"\n");
   for (const auto& [file, message] :
        {std::pair{"inject.toml", "inject.toml: --inject X.backlsh.gap_um=3: "},
-        {"gcode.toml", "gcode.toml: gcode:2: "},
+        {"gcode.toml", "gcode.toml: gcode:2:1: "},
         {"program.toml", "program.toml: "}}) {
     const Said said = lockout(scratch_ / file);
     EXPECT_EQ(said.code, 2) << said.out << said.err;
     EXPECT_NE(said.err.find(message), std::string::npos) << said.err;
     EXPECT_EQ(std::count(said.err.begin(), said.err.end(), '\n'), 1) << said.err;
   }
-  EXPECT_NE(lockout(scratch_ / "program.toml").err.find("bad.ngc:2: "), std::string::npos);
+  EXPECT_NE(lockout(scratch_ / "program.toml").err.find("bad.ngc:2:1: "), std::string::npos);
   // What only the probe forbids is what such a scenario is about.
   write_text(scratch_ / "fast.toml",
              head + "expect = \"refused\"\ngcode = \"G43.4 H1\\nG1 X90 F30000\\nM30\"\n");

@@ -56,6 +56,22 @@ TEST_F(Vcnc, OneHashInOneProcessAndInManyFreeAndPaced) {
   EXPECT_EQ(leftovers(), "");
 }
 
+/// The program goes on from what the probe has told, over the bus.
+TEST_F(Vcnc, AProbingProgramHasOneHashInOneProcessAndInMany) {
+  write_text(scratch_ / "wall.toml",
+             "name = \"wall\"\nkind = \"plane\"\ncentre_mm = [20, 0, 0]\n"
+             "direction = [1, 0, 0]\nradius_mm = 100\n");
+  write_text(scratch_ / "short.ngc",
+             "G38.2 X15 F1500\n#1=#5061\nG0 X30\nG1 X[#1+1] F1500\nG4 P0.01\nM30\n");
+  const std::string wall = " --set setup.piece=" + (scratch_ / "wall.toml") +
+                           " --set axes.X.start_mm=30 --set axes.Z.start_mm=250";
+  ASSERT_EQ(run("a", "--in-process" + wall).code, 0);
+  ASSERT_EQ(run("b", wall).code, 0);
+  ASSERT_EQ(run("c", "--bus inproc://" + wall).code, 0);
+  EXPECT_EQ(hash("a").size(), 32u);
+  for (const char* other : {"b", "c"}) EXPECT_EQ(hash("a"), hash(other)) << other;
+}
+
 TEST_F(Vcnc, TheSeedIsPartOfTheScenario) {
   ASSERT_EQ(run("a", "--in-process --seed 1").code, 0);
   ASSERT_EQ(run("b", "--in-process --seed 2").code, 0);
@@ -289,7 +305,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"NoProgram", "{S}none.ngc --machine {M} --out {S}out", 2, "none.ngc"},
         BadInput{"ErrorInTheMiddle", "{S}error.ngc --machine {M} --out {S}out", 2,
                  "error.ngc:4:1: "},
-        BadInput{"AxisLimit", "{S}far.ngc --machine {M} --out {S}out", 2, "far.ngc:3: "},
+        BadInput{"AxisLimit", "{S}far.ngc --machine {M} --out {S}out", 2, "far.ngc:3:1: "},
         BadInput{"NoPiece", "{GOOD} --set setup.piece={S}none.toml", 2,
                  "none.toml: cannot be opened"},
         BadInput{"BadSurface", "{GOOD} --set setup.piece={S}surface.toml", 2, "surface.toml: "},

@@ -51,7 +51,7 @@ std::string path_of(const std::string& text, InterpreterOptions options = bare()
   std::string path;
   for (const Move& move : moves_of(text, std::move(options))) {
     path += path.empty() ? "" : "; ";
-    path += move.probe                       ? "p"
+    path += move.probe != Move::Probe::none  ? "p"
             : move.kind == Move::Kind::rapid ? "r"
             : move.kind == Move::Kind::arc   ? "a"
                                              : "l";
@@ -103,7 +103,7 @@ TEST(GcodeOffsets, ReferencePointsAndProbing) {
   EXPECT_EQ(path_of("G0 X5\nG28.1\nX1 Y1\nG28"), "r 5 0 0; r 1 1 0; r 5 0 0");
   EXPECT_EQ(path_of("G30 X9 Y9"), "r 9 9 0; r 0 0 0");
   EXPECT_EQ(path_of("G38.2 Z-4 F50\nG0 X[#5063] Y#5070"), "p 0 0 -4; r -4 1 -4");
-  EXPECT_EQ(refused("G38.2 F10"), "1: G38.2 without axis words");
+  EXPECT_EQ(refused("G38.2 F10"), "1:1: G38.2 without axis words");
 }
 
 TEST(GcodeOffsets, ParametersShowTheState) {
@@ -318,7 +318,7 @@ TEST(GcodeFlow, SubroutinesInFilesBesideTheProgram) {
 
 TEST(GcodeFlow, WhatDoesNotEndOrFitIsRefused) {
   EXPECT_EQ(refused("O1 while [1]\nO1 endwhile"),
-            "2: more than 2000000 passes of loops, calls and jumps; does the program end?");
+            "2:1: more than 2000000 passes of loops, calls and jumps; does the program end?");
   EXPECT_NE(refused("O1 sub\nO1 call\nO1 endsub\nO1 call").find("nested deeper than 50"),
             std::string::npos);
   EXPECT_NE(refused("O1 if [1]").find("1: O1 IF without its end"), std::string::npos);
@@ -573,10 +573,133 @@ TEST(Siemens, ADwellTakesNoFeedAndNoSpeed) {
   EXPECT_NEAR(std::get<Move>(blocks[4]).feed, 0.1 / 60, 1e-15);
 }
 
+TEST(Siemens, JumpsGoToLabelsAndBlocks) {
+  EXPECT_EQ(path_of("R1=0\nAGAIN: R1=R1+1\nG0 X=R1\nIF R1<3 GOTOB AGAIN\nGOTO _END1\nX9\n"
+                    "_END1: Y2",
+                    siemens()),
+            "r 1 0 0; r 2 0 0; r 3 0 0; r 3 2 0");
+  EXPECT_EQ(path_of("GOTOF N40\nN30 G0 X1\nN40 G0 Y1\nGOTOC NOWHERE\nZ1", siemens()),
+            "r 0 1 0; r 0 1 1");
+  EXPECT_NE(refused("TOP: G0 X1\nGOTOF TOP", siemens()).find("2:1: GOTOF TOP: there is no such"),
+            std::string::npos);
+}
+
+TEST(Siemens, StructuresNest) {
+  EXPECT_EQ(
+      path_of("FOR R1=1 TO 2\nIF R1==2\nG0 X=R1\nELSE\nG0 Y=R1\nENDIF\nENDFOR\nZ=R1", siemens()),
+      "r 0 1 0; r 2 1 0; r 2 1 3");
+  EXPECT_EQ(path_of("R1=5\nFOR R2=R1 TO 1\nG0 X99\nENDFOR\nG0 X=R2", siemens()), "r 5 0 0");
+  EXPECT_EQ(path_of("REPEAT\nR1=R1+1\nUNTIL R1>=4\nG0 X=R1", siemens()), "r 4 0 0");
+  EXPECT_EQ(path_of("WHILE (R1<3) OR FALSE\nR1=R1+1\nENDWHILE\nG0 X=R1", siemens()), "r 3 0 0");
+}
+
+/// Relations bind least, so that AND belongs to its neighbours (Siemens, priorities).
+TEST(Siemens, OperatorsHaveTheirOwnRanks) {
+  EXPECT_EQ(path_of("R1=7 DIV 2 R2=7 MOD 4 R3=NOT 0\nG0 X=R1 Y=R2 Z=R3", siemens()), "r 3 3 1");
+  EXPECT_EQ(path_of("R1=(2<3) AND (4<>4)\nR2=1 AND 1==1\nR3=0 OR 1 AND 0\nG0 X=R1+5 Y=R2 Z=R3+2",
+                    siemens()),
+            "r 5 1 2");
+}
+
+TEST(Siemens, FramesReplaceOrAddUp) {
+  EXPECT_EQ(path_of("TRANS X10 Y5\nG0 X1 Y0\nAROT RPL=90\nX1 Y0\nROT RPL=90\nX1 Y0\nROT\nX1 Y0",
+                    siemens()),
+            "r 11 5 0; r 10 6 0; r 0 1 0; r 1 0 0");
+  const Move turned = moves_of("MIRROR X0\nG0 X1 Y0\nG3 X0 Y1 I-1 J0 F9", siemens())[1];
+  EXPECT_NEAR(turned.arc.sweep, -kPi / 2, 1e-12);
+  EXPECT_LE((turned.end.head<3>() - Vec3(0, 1e-3, 0)).norm(), 1e-15);
+  EXPECT_NE(refused("SCALE X2\nG0 X1\nG3 X0 Y1 I-1 J0 F9", siemens()).find("3:1: G2 or G3 while"),
+            std::string::npos);
+  // In the plane ZX a turn of 90 deg takes Z to X and X to -Z.
+  EXPECT_EQ(path_of("G18\nROT RPL=90\nG0 Z1 X2", siemens()), "r 1 0 -2");
+}
+
+TEST(Siemens, CirclesGoOnTangentially) {
+  const Move ct = moves_of("G1 X10 F100\nCT X15 Y5", siemens())[1];
+  EXPECT_LE((ct.arc.centre.head<2>() - Vec2(10e-3, 5e-3)).norm(), 1e-15);
+  EXPECT_NEAR(ct.arc.sweep, kPi / 2, 1e-12);
+  EXPECT_EQ(moves_of("G1 X10 F100\nCT X20", siemens())[1].kind, Move::Kind::line);
+}
+
+TEST(Siemens, Measures) {
+  EXPECT_EQ(path_of("TRANS X10\nMEAS=1 G1 X5 F100\nR1=$AA_MW[X] R2=$AA_MM[X] R3=$AC_MEA[1]\n"
+                    "TRANS\nG0 X=R1 Y=R2 Z=R3",
+                    siemens()),
+            "p 15 0 0; r 5 15 1");
+}
+
 TEST(Siemens, UnknownWordsAreNamed) {
-  EXPECT_NE(refused("G1 F100 X1\nCT X2", siemens()).find("2:1: unknown word CT"),
+  EXPECT_NE(refused("G1 F100 X1\nSPLINE X2", siemens()).find("2:1: unknown word SPLINE"),
             std::string::npos);
   EXPECT_NE(refused("CIP X8 Y6").find("1:1: unknown word CIP"), std::string::npos);
+}
+
+// -------------------------------------------------------------------------------- Fanuc's frames
+
+InterpreterOptions fanuc() {
+  InterpreterOptions options = bare();
+  options.dialect = InterpreterOptions::Dialect::fanuc;
+  return options;
+}
+
+TEST(Frames, PolarCoordinates) {
+  EXPECT_EQ(path_of("G16\nG0 X10 Y30\nG91 Y60\nG90 X4\nG15 X1"),
+            "r 8.6603 5 0; r 0 10 0; r 0 4 0; r 1 4 0");
+  EXPECT_EQ(path_of("G18 G16\nG0 Z10 X90\nG15"), "r 10 0 0");
+  EXPECT_EQ(path_of("G0 X5 Y5\nG91 G16 X2 Y90\nG15"), "r 5 5 0; r 3.5858 6.4142 0");
+  EXPECT_EQ(path_of("F9 G99 G16 G81 X10 Y0 Z-1 R0\nY90\nG80 G15"),
+            "r 10 0 0; l 10 0 -1; r 10 0 0; r 0 10 0; l 0 10 -1; r 0 10 0");
+}
+
+TEST(Frames, ScalingAndMirrors) {
+  EXPECT_EQ(path_of("G51 X0 Y0 P2000\nG0 X3 Y4\nG50 X3"), "r 6 8 0; r 3 8 0");
+  EXPECT_EQ(path_of("G51 X10 P0.5\nG0 X20"), "r 15 0 0");
+  EXPECT_EQ(path_of("G51 X0 Y0 Z0 I-1000 J1000 K500\nG0 X3 Y4 Z4"), "r -3 4 2");
+  EXPECT_EQ(path_of("G51.1 X5\nG0 X7\nG50.1 X0\nX7"), "r 3 0 0; r 7 0 0");
+  EXPECT_EQ(path_of("G51.1 X0\nG68 X0 Y0 R90\nG0 X1 Y0"), "r 0 1 0") << "turned the other way";
+  // #5041 is the position in the words of the program
+  EXPECT_EQ(path_of("G51 X10 P2000\nG0 X15\n#1=#5420\nG50\nX#1"), "r 20 0 0; r 15 0 0");
+  EXPECT_NE(refused("G51 P50").find("1:5: P50 of G51"), std::string::npos);
+  EXPECT_NE(refused("G51.1 X0\nG92 X1").find("2:1: G92 under G51"), std::string::npos);
+}
+
+/// A contour on one side, mirrored, is the mirrored contour on the other side.
+TEST(Frames, AMirrorChangesTheSideOfTheCutter) {
+  const auto mirrored =
+      moves_of("F500\nG0 X0 Y0\nG51.1 X0\nG42 D1 G1 X20 Y0\nX40\nG3 X50 Y10 J10\nG40 G1 X60 Y30");
+  const auto by_hand =
+      moves_of("F500\nG0 X0 Y0\nG41 D1 G1 X-20 Y0\nX-40\nG2 X-50 Y10 J10\nG40 G1 X-60 Y30");
+  ASSERT_EQ(mirrored.size(), by_hand.size());
+  for (std::size_t i = 0; i < mirrored.size(); ++i) {
+    EXPECT_LE((mirrored[i].end - by_hand[i].end).norm(), 1e-12) << i;
+    EXPECT_NEAR(mirrored[i].arc.sweep, by_hand[i].arc.sweep, 1e-9) << i;
+  }
+}
+
+TEST(Frames, FurtherOffsets) {
+  EXPECT_EQ(
+      path_of("G10 L20 P3 X10 Y5\nG54.1 P3 G0 X1 Y1\n#7041=12\nG54.1 P3 X1\nG54 X#4130", fanuc()),
+      "r 11 6 0; r 13 6 0; r 3 6 0");
+  const ProgramFile file("G10 L20 P48 Y-7\nM30\n");
+  GcodeInterpreter program(file.path(), Machine(), fanuc());
+  while (!std::holds_alternative<ProgramEnd>(program.next())) {
+  }
+  InterpreterOptions next = fanuc();
+  next.data = program.data();
+  EXPECT_EQ(path_of("G54.1 P48 G0 Y0", next), "r 0 -7 0") << "kept";
+  EXPECT_NE(to_text(next.data).find("G54.1 P48"), std::string::npos);
+}
+
+// --------------------------------------------------------------------------- places of errors
+
+TEST(Errors, AlwaysNameLineAndColumn) {
+  EXPECT_EQ(refused("G1 F9 X1\n  G38.2").substr(0, 5), "2:3: ");
+  EXPECT_EQ(refused("o1 while [1]\no1 endwhile").substr(0, 5), "2:1: ");
+  EXPECT_EQ(refused("o1 sub\n  o1 call\no1 endsub\no1 call").substr(0, 5), "2:3: ");
+  EXPECT_EQ(refused("N10 o5 endif").substr(0, 5), "1:5: ");
+  EXPECT_EQ(refused("N5 GOTO 5", fanuc()).substr(0, 5), "1:4: ");
+  EXPECT_EQ(refused(std::string(5000, 'X')).substr(0, 8), "1:4097: ");
+  EXPECT_EQ(refused("F9\nG41.1 D10 G1 X10 Y0\nX20\n Y1\nX19\nY-9\nG40 X40").substr(0, 5), "4:2: ");
 }
 
 // ------------------------------------------------------------------------- inputs and outputs

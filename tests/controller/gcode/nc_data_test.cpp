@@ -101,11 +101,13 @@ TEST(NcData, BytesThatAreNoneAreRefused) {
   NcData data;
   data.parameters = {{31, 1.5}, {5221, 0.1}};
   data.tools[4].diameter = 0.01;
-  const auto bytes = encode_nc_data({data, data});
+  const ProbeTouch touch{7, true, 1.25, {1, 2, 3, 4, 5}, {2, 3, 4, 5, 6}, {3, 4, 5, 6, 7}};
+  const auto bytes = encode_nc_data({data, data, {touch, touch}});
+  EXPECT_EQ(decode_nc_data(bytes).value().touches, (std::vector<ProbeTouch>{touch, touch}));
   for (std::size_t cut = 0; cut < bytes.size(); ++cut)
     EXPECT_FALSE(decode_nc_data({bytes.data(), cut})) << cut;
   auto wrong = bytes;
-  wrong[0] = 2;
+  wrong[0] = 3;
   EXPECT_FALSE(decode_nc_data(wrong));
   EXPECT_EQ(to_var_file(data), "31\t1.5\n5221\t100\n");
   EXPECT_NE(to_text(data).find("G54          X100.0000\ntool 4"), std::string::npos);

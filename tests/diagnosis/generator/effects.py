@@ -437,7 +437,7 @@ def signal_phase(m, axis, p):
     m.probe.quadrature = np.deg2rad(p["angle_deg"])
 
 
-@effect(("probe",), periods=fixed(1.0), channel=lambda r, place: float(r.integers(0, 2)), start_s=lambda r, place: float(r.uniform(10, 50)))
+@effect(("probe",), periods=fixed(1.0), channel=lambda r, place: float(r.integers(0, 2)), start_s=lambda r, place: float(r.uniform(8, 40)))
 def period_slip(m, axis, p):
     one = np.zeros(3)
     one[int(p["channel"])] = m.probe.period

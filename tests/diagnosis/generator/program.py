@@ -26,7 +26,7 @@ def program():
 
     def turning(word):
         """Two rounds while a rotary axis goes there and back; the ball never comes to rest on the piece."""
-        r, there = RADIUS, {"C": (120, 0), "A": (12, -12)}[word]
+        r, there = RADIUS, {"C": (120, 0), "A": (35, -35)}[word]
         return [f"G3 X{r:g} Y0 I{r / 2:g} J0 F6000", f"G3 X{r:g} Y0 I{-r:g} J0 {word}{there[0]}",
                 f"G3 X{r:g} Y0 I{-r:g} J0 {word}{there[1]}", f"G3 X0 Y0 I{-r / 2:g} J0 {word}0"]
 

@@ -1,0 +1,10 @@
+(G51.1 and cutter compensation)
+F500
+G0 X0 Y0
+G51.1 X0
+G42 D1 G1 X20 Y0
+X40
+Y30
+G40 X60 Y40
+G50.1
+M30

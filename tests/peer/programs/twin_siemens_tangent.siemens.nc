@@ -1,0 +1,10 @@
+; CT: circles that go on tangentially
+G1 F500 X10 Y0
+CT X20 Y10
+CT X10 Y20
+CT X10 Y30
+G1 X10 Y40
+CT X10 Y50
+G18 G1 Z10
+CT Z20 X20
+M30

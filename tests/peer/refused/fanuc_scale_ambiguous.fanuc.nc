@@ -1,0 +1,4 @@
+(refused: 3:11 P20 of G51)
+F500
+G51 X0 Y0 P20
+M30

@@ -1,0 +1,5 @@
+(refused: 4:1 ellipse)
+F500
+G51 I2000 J1000 K1000
+G2 X10 Y0 I5
+M30

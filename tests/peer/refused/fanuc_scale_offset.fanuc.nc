@@ -1,0 +1,5 @@
+(refused: 4:1 G55 under G51)
+F500
+G51 X0 P2000
+G55
+M30

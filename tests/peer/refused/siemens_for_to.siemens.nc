@@ -1,0 +1,4 @@
+(refused: 2:10 TO)
+FOR R1=1 BY 5
+ENDFOR
+M30

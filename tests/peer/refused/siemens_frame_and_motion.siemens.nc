@@ -1,0 +1,3 @@
+(refused: 2:10 two blocks)
+TRANS X1 G0
+M30

@@ -1,0 +1,3 @@
+(refused: 2:1 unknown word GOTOS)
+GOTOS
+M30

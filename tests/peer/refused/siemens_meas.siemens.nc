@@ -1,0 +1,3 @@
+(refused: 2:1 MEAS=3)
+MEAS=3 G1 F500 X10
+M30
