@@ -1,6 +1,7 @@
 #include "diagnosis/diagnose.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "diagnosis/findings.hpp"
@@ -46,7 +47,11 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
                             declared.probe.signal_period);
   if (slip) declared.effects.get<PeriodSlip>() = *slip;
   Evidence evidence(of.record, of.replica, declared, difference ? difference->noise_scale : 1);
-  if (difference) options.form_of_channel = forms_of(evidence, *difference);
+  if (difference) {
+    options.form_of_channel = forms_of(evidence, *difference);
+    options.form_um = 1e6 * kChangeOfForm *
+                      std::hypot(difference->off[0], difference->off[1], difference->off[2]);
+  }
   options.least_gain =
       std::max(options.least_gain, kFormAllowance * evidence.count(Role::held_out));
   options.form = kForm * evidence.count(Role::held_out);

@@ -182,9 +182,10 @@ class Report {
   }
 
   /// Largest RMS of what two predictions differ by, of the noise of one sample of the signal.
-  double largest_of_noise(const Prediction& a, const Prediction& b) const {
+  double largest_of_noise(const Prediction& a, const Prediction& b, bool readings) const {
     double largest = 0;
     for (std::size_t c = 0; c < a.size(); ++c) {
+      if (!readings && evidence_.replica().channels()[c].kind == SignalKind::deflection) continue;
       double sum = 0, n = 0;
       for (const Block& block : evidence_.partition().blocks)
         for (std::size_t k = block.begin; k < block.end; ++k)
@@ -195,16 +196,28 @@ class Report {
     return largest;
   }
 
+  static std::string name_of(const FoundEffect& e) {
+    return e.name == "deviation" ? e.place : e.place + "." + e.name;
+  }
+
   /// Whether an effect is too small for a word; then it is noted and put back.
   bool negligible(const FoundEffect& e, const Machine& without, const Prediction& prediction) {
-    if (e.contour_error_um >= kLeastContour) return false;
-    const double share = largest_of_noise(found().prediction, prediction);
+    if (e.contour_error_um >= std::max(kLeastContour, options_.form_um)) return false;
+    const bool within_form = e.contour_error_um >= kLeastContour;
+    const double share = largest_of_noise(found().prediction, prediction, !within_form);
     if (share >= kLeastOfNoise) return false;
-    d_.notes.push_back(fmt::format(
-        "{} fits a little ({} = {:.3g}) but does nothing that matters: {:.2g} um rms to "
-        "the contour and {:.0f} % of the noise of a sample to any signal.",
-        e.name == "deviation" ? e.place : e.place + "." + e.name, e.numbers.front().key,
-        e.numbers.front().value, e.contour_error_um, 100 * share));
+    if (within_form)
+      d_.notes.push_back(
+          fmt::format("{} fits, but moves the reading by {:.2g} um rms only: what the model gets "
+                      "wrong about the "
+                      "healthy machine changes by as much ({:.2g} um).",
+                      name_of(e), e.contour_error_um, options_.form_um));
+    else
+      d_.notes.push_back(fmt::format(
+          "{} fits a little ({} = {:.3g}) but does nothing that matters: {:.2g} um rms to "
+          "the contour and {:.0f} % of the noise of a sample to any signal.",
+          name_of(e), e.numbers.front().key, e.numbers.front().value, e.contour_error_um,
+          100 * share));
     for (const FittedNumber& n : e.numbers) move_number(d_.found, n.key, number_of(without, n.key));
     return true;
   }

@@ -44,6 +44,8 @@ struct DiagnosisOptions {
   /// one effect may take for its own. Empty: none.
   std::vector<double> form_of_channel;
   double taken_of_form = 0.5;
+  double form_um =
+      0;  ///< RMS of the reading that this form makes; less in readings alone is a note
   double class_gain = 30, class_share = 0.05;
   double law_gain = 40;           ///< of a generic law
   double model_form = 1.10;       ///< chi-square per sample above which no cause is named
