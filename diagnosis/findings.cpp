@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <tuple>
+#include <utility>
 
+#include "diagnosis/search/consequence.hpp"
 #include "diagnosis/search/freed_number.hpp"
 #include "diagnosis/search/generic_laws.hpp"
 #include "diagnosis/search/intervals.hpp"
@@ -15,13 +18,11 @@
 namespace vcnc {
 namespace {
 
+/// Of the noise of a sample: two machines that differ by less are the same.
+constexpr double kSameMachine = 1e-3;
 constexpr double kQuiet = 1.05, kAllExplained = 0.98;
-/// Below both, an effect is of no consequence: RMS of what it does to the contour [um], and to any
-/// signal, of the noise of one sample.
-constexpr double kLeastContour = 0.01, kLeastOfNoise = 0.1;
 /// Part of the noise's chi-square that no law is sought in.
 constexpr double kFloorScatter = 0.04;
-constexpr double kGainAtLimit = 25;  ///< of five standard deviations
 /// A number that costs less chi-square to be as declared is put back: this much, or this part of
 /// what an effect must gain.
 constexpr double kUnneeded = 4, kUnneededPart = 0.25;
@@ -55,31 +56,17 @@ std::string program_for(const std::string& effect) {
   return "";
 }
 
+/// "effects.X.scale_error.error_ppm": ("X", "scale_error").
+std::pair<std::string, std::string> place_and_effect(const std::string& key) {
+  const std::size_t place = key.find('.') + 1, effect = key.find('.', place) + 1;
+  return {key.substr(place, effect - place - 1),
+          key.substr(effect, key.find('.', effect) - effect)};
+}
+
 bool of_measurement(const std::string& effect) {
   const EffectText* text = text_of(effect);
   return text && (text->family == Family::probe || text->family == Family::acquisition ||
                   text->family == Family::setup);
-}
-
-/// RMS of what two predictions differ by where it can be seen: at the probe, else at the linear
-/// axes [um].
-double effect_on_contour(const Evidence& evidence, const Prediction& a, const Prediction& b) {
-  const std::vector<ComparedChannel>& channels = evidence.replica().channels();
-  const auto among = [&](SignalKind kind) {
-    double sum = 0, n = 0;
-    for (std::size_t c = 0; c < channels.size(); ++c) {
-      if (channels[c].kind != kind || (kind == SignalKind::position && is_rotary(channels[c].axis)))
-        continue;
-      n = std::max(n, evidence.count(c, Role::both));
-      for (const Block& block : evidence.partition().blocks)
-        for (std::size_t k = block.begin; k < block.end; ++k)
-          if (const double d = a[c][k] - b[c][k]; std::isfinite(d)) sum += d * d;
-    }
-    return n > 0 ? std::sqrt(sum / n) * 1e6 : 0;
-  };
-  const bool probed = std::any_of(channels.begin(), channels.end(),
-                                  [](const auto& c) { return c.kind == SignalKind::deflection; });
-  return among(probed ? SignalKind::deflection : SignalKind::position);
 }
 
 std::string channel_name(const ComparedChannel& c) {
@@ -113,6 +100,7 @@ class Report {
 
   Diagnosis write() {
     put_back_unneeded();
+    prefer_positive();
     tell_slip();
     tell_effects();
     tell_clamping();
@@ -132,6 +120,11 @@ class Report {
  private:
   const FittedMachine& found() const { return selection_.found; }
   double excess(double held_out) const { return std::max(0.0, held_out - floor_); }
+
+  /// Whether the model is known to be more than noise off the machine.
+  bool inexact() const {
+    return !options_.form_of_channel.empty() || found().held_out > options_.model_form * floor_;
+  }
 
   /// A flexible effect has numbers that the record can do without: they go back to the declaration,
   /// the least needed first.
@@ -169,6 +162,38 @@ class Report {
     d_.found = m.machine;
   }
 
+  /// A wave of a negative amplitude is one of a positive amplitude half a period on: the first
+  /// amplitude is told positive where that is the same machine.
+  void prefer_positive() {
+    FittedMachine& m = selection_.found;
+    for (AddedEffect& a : m.added) {
+      const auto phase = std::find_if(a.numbers.begin(), a.numbers.end(),
+                                      [](const FreedNumber& n) { return is_phase(n.number); });
+      if (phase == a.numbers.end()) continue;
+      std::vector<FreedNumber> turned = a.numbers;
+      bool negative = false, first = true;
+      for (FreedNumber& n : turned) {
+        if (is_phase(n.number)) n.value = std::remainder(n.value, 360);
+        if (n.shape || is_phase(n.number) || has_no_phase(n.number)) continue;
+        if (first) negative = n.value < 0;
+        first = false;
+        n.value = -n.value;
+      }
+      std::vector<FreedNumber> told = a.numbers;
+      told[static_cast<std::size_t>(phase - a.numbers.begin())].value =
+          std::remainder(phase->value, 360);
+      if (negative) {
+        FreedNumber& p = turned[static_cast<std::size_t>(phase - a.numbers.begin())];
+        p.value = std::remainder(p.value + 180, 360);
+        const Prediction same = evidence_.predict(with(m.machine, turned));
+        if (consequence(evidence_, same, m.prediction).of_noise < kSameMachine) told = turned;
+      }
+      a.numbers = std::move(told);
+      m.machine = with(m.machine, a.numbers);
+    }
+    d_.found = m.machine;
+  }
+
   /// A number of an added effect leaves the fit, and its column with it.
   static void forget(FittedMachine& m, AddedEffect& of, std::size_t number) {
     std::size_t column = number;
@@ -181,31 +206,17 @@ class Report {
       m.columns.erase(m.columns.begin() + static_cast<std::ptrdiff_t>(column));
   }
 
-  /// Largest RMS of what two predictions differ by, of the noise of one sample of the signal.
-  double largest_of_noise(const Prediction& a, const Prediction& b, bool readings) const {
-    double largest = 0;
-    for (std::size_t c = 0; c < a.size(); ++c) {
-      if (!readings && evidence_.replica().channels()[c].kind == SignalKind::deflection) continue;
-      double sum = 0, n = 0;
-      for (const Block& block : evidence_.partition().blocks)
-        for (std::size_t k = block.begin; k < block.end; ++k)
-          if (const double d = a[c][k] - b[c][k]; std::isfinite(d)) sum += d * d, n += 1;
-      const double noise = evidence_.noise().channels[c].rms;
-      if (n > 0 && noise > 0) largest = std::max(largest, std::sqrt(sum / n) / noise);
-    }
-    return largest;
-  }
-
   static std::string name_of(const FoundEffect& e) {
     return e.name == "deviation" ? e.place : e.place + "." + e.name;
   }
 
   /// Whether an effect is too small for a word; then it is noted and put back.
   bool negligible(const FoundEffect& e, const Machine& without, const Prediction& prediction) {
-    if (e.contour_error_um >= std::max(kLeastContour, options_.form_um)) return false;
-    const bool within_form = e.contour_error_um >= kLeastContour;
-    const double share = largest_of_noise(found().prediction, prediction, !within_form);
-    if (share >= kLeastOfNoise) return false;
+    if (e.contour_error_um >= std::max(options_.least_contour_um, options_.form_um)) return false;
+    const bool within_form = e.contour_error_um >= options_.least_contour_um;
+    const Consequence of = consequence(evidence_, found().prediction, prediction);
+    const double share = within_form ? of.of_noise_but_readings : of.of_noise;
+    if (share >= options_.least_of_noise) return false;
     if (within_form)
       d_.notes.push_back(
           fmt::format("{} fits, but moves the reading by {:.2g} um rms only: what the model gets "
@@ -223,7 +234,7 @@ class Report {
   }
 
   void tell_effects() {
-    const std::map<std::string, Interval> intervals = intervals_of(evidence_, found());
+    const std::map<std::string, Interval> intervals = intervals_of(evidence_, found(), inexact());
     const auto fitted = [&](const FreedNumber& n) {
       const auto i = intervals.find(n.number.key);
       const double half = i == intervals.end() ? 0 : i->second.half_width;
@@ -245,7 +256,7 @@ class Report {
       for (const FreeNumber& n : candidate.numbers)
         move_number(without, n.key, number_of(of_.declared, n.key));
       const Prediction less = evidence_.predict(without);
-      e.contour_error_um = effect_on_contour(evidence_, found().prediction, less);
+      e.contour_error_um = consequence(evidence_, found().prediction, less).contour_um;
       if (negligible(e, without, less)) continue;
       e.acquisition = of_measurement(e.name);
       for (const std::size_t other : a.class_with)
@@ -264,16 +275,12 @@ class Report {
       FoundEffect e;
       e.name = "deviation";
       e.place = key;
-      if (never_quite_absent(key)) {  // "effects.X.scale_error.error_ppm": an effect by its name
-        const std::size_t place = key.find('.') + 1, effect = key.find('.', place) + 1;
-        e.place = key.substr(place, effect - place - 1);
-        e.name = key.substr(effect, key.find('.', effect) - effect);
-      }
+      if (never_quite_absent(key)) std::tie(e.place, e.name) = place_and_effect(key);
       e.numbers.push_back(fitted(n));
       Machine without = found().machine;
       move_number(without, key, n.centre);
       const Prediction less = evidence_.predict(without);
-      e.contour_error_um = effect_on_contour(evidence_, found().prediction, less);
+      e.contour_error_um = consequence(evidence_, found().prediction, less).contour_um;
       if (negligible(e, without, less)) continue;
       d_.effects.push_back(std::move(e));
     }
@@ -299,7 +306,7 @@ class Report {
     Machine without = found().machine;
     without.effects.get<PeriodSlip>() = {};
     const Prediction less = evidence_.predict(without);
-    e.contour_error_um = effect_on_contour(evidence_, found().prediction, less);
+    e.contour_error_um = consequence(evidence_, found().prediction, less).contour_um;
     e.gain = evidence_.chi2(evidence_.residual(less), Role::held_out) -
              evidence_.chi2(found().residual, Role::held_out);
     e.acquisition = true;
@@ -310,12 +317,12 @@ class Report {
   double moved_by(const FreedNumber& n) const {
     Machine without = found().machine;
     move_number(without, n.number.key, n.centre);
-    return effect_on_contour(evidence_, found().prediction, evidence_.predict(without));
+    return consequence(evidence_, found().prediction, evidence_.predict(without)).contour_um;
   }
 
   /// Where the piece was clamped is part of every fit; it is told where it is worth a word.
   void tell_clamping() {
-    const std::map<std::string, Interval> intervals = intervals_of(evidence_, found());
+    const std::map<std::string, Interval> intervals = intervals_of(evidence_, found(), inexact());
     std::map<std::string, FoundEffect> by_effect;
     for (const FreedNumber& n : found().nuisances.numbers) {
       const std::string& key = n.number.key;
@@ -386,18 +393,30 @@ class Report {
 
   void tell_law() {
     const double left = excess(found().held_out);
-    if (left < options_.law_gain + kFloorScatter * floor_) return;
+    const bool quiet = left < options_.law_gain + kFloorScatter * floor_;
+    if (quiet && found().added.empty()) return;
     const double needed = std::max({options_.law_gain, options_.least_share * left,
                                     options_.share_of_form * std::min(left, options_.form)});
-    LawFit law = best_law(evidence_, found(), options_);
-    // A law that does better than a single named effect takes its name away.
-    if (found().added.size() == 1) {
-      LawFit instead = best_law(evidence_, selection_.base, options_);
+    const std::vector<double> base = evidence_.chi2_of(selection_.base.residual, Role::held_out),
+                              now = evidence_.chi2_of(found().residual, Role::held_out);
+    const bool anything = !found().added.empty() || !found().released.empty();
+    LawFit law;
+    if (!quiet)
+      law = best_law(evidence_, found(),
+                     doubt_of(options_, anything ? base : std::vector<double>{}, now), options_);
+    // A law that does better than all that was named takes the names away.
+    if (!found().added.empty()) {
+      LawFit instead = best_law(evidence_, selection_.base, doubt_of(options_, {}, base), options_);
       const double named = selection_.base.held_out - found().held_out;
-      if (instead.gain > named + needed && instead.gain > 0.5 * (named + std::max(0.0, law.gain))) {
-        d_.notes.push_back(fmt::format("It looks like {}, but {} fits better.",
-                                       of_.candidates[found().added[0].candidate].name(),
-                                       words_of(instead.law.law)));
+      const double clearly = needed + options_.share_of_found * named;
+      if (instead.gain > (found().added.size() > 1 ? named - clearly : named + clearly) &&
+          instead.gain > 0.5 * (named + std::max(0.0, law.gain))) {
+        std::string names;
+        for (const AddedEffect& a : found().added)
+          names += (names.empty() ? "" : " with ") + of_.candidates[a.candidate].name();
+        d_.notes.push_back(fmt::format("It looks like {}, but {} alone {}.", names,
+                                       words_of(instead.law.law),
+                                       instead.gain > named ? "fits better" : "fits as well"));
         std::erase_if(d_.effects, [](const FoundEffect& e) {
           return !e.place.empty() && e.place != "setup" && e.name != "deviation";
         });
@@ -405,7 +424,7 @@ class Report {
         law = std::move(instead);
       }
     }
-    if (law.gain < needed) return;
+    if (law.gain < needed || (quiet && !withdrawn_)) return;
     law_gain_ = law.gain;
     d_.law = law.law;
     d_.found = law.machine;
@@ -414,8 +433,11 @@ class Report {
   void tell_excitation() {
     std::map<std::size_t, double> limits;
     for (const TrialColumns& t : selection_.trials) {
-      const auto at = limits.try_emplace(t.trial.candidate, t.detection_limit).first;
-      at->second = std::min(at->second, t.detection_limit);
+      double& limit = limits.try_emplace(t.trial.candidate, t.detection_limit).first->second;
+      // The smallest size that is seen; of limits the largest.
+      const bool largest = t.trial.directions.front().whole && std::isfinite(limit);
+      if (std::isfinite(t.detection_limit))
+        limit = largest ? std::max(limit, t.detection_limit) : std::min(limit, t.detection_limit);
     }
     double finest = std::numeric_limits<double>::infinity();  // slip of a period that would show
     for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
@@ -428,9 +450,19 @@ class Report {
       double typical = 0;
       for (std::size_t i = 0; i < candidate.numbers.size() && typical == 0; ++i)
         typical = std::abs(candidate.numbers[i].typical);
-      const double told = limit * std::sqrt(options_.least_gain / kGainAtLimit);
-      Excitation e{candidate.name(), told, told < typical, ""};
+      const bool limited = is_limit(candidate.numbers.front());
+      Excitation e{candidate.name(), limit, limited ? std::isfinite(limit) : limit < typical, ""};
       if (!e.excited) e.program = program_for(candidate.effect);
+      d_.excitation.push_back(std::move(e));
+    }
+    for (std::size_t i = 0; i < selection_.release_limits.size(); ++i) {
+      const FreeNumber& n = selection_.base.nuisances.numbers[i].number;
+      if (n.key.starts_with("effects.setup.")) continue;
+      const auto [place, effect] = place_and_effect(n.key);
+      const double limit = selection_.release_limits[i];
+      Excitation e{never_quite_absent(n.key) ? place + "." + effect : n.key, limit,
+                   std::isfinite(limit), ""};
+      if (!e.excited) e.program = program_for(effect);
       d_.excitation.push_back(std::move(e));
     }
   }

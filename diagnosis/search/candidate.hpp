@@ -35,6 +35,7 @@ struct Candidate {
   /// Numbers that a null effect leaves without a meaning and that are tried at several values: the
   /// frequency of a vibration, the time constant of a drift.
   std::vector<std::size_t> shape;  ///< indices into numbers
+  Family family = Family::nc;      ///< of the effect
 
   std::string name() const { return place.empty() ? effect : place + "." + effect; }
 };

@@ -57,7 +57,8 @@ void add_candidate(const EffectPlace& place, std::vector<Candidate>& all) {
       components.push_back({i, k});
   const std::vector<double> sizes = typical_sizes(at_nominal, components);
 
-  Candidate candidate{std::string(Effect::text.name), std::string(place.name), {}, {}};
+  Candidate candidate{
+      std::string(Effect::text.name), std::string(place.name), {}, {}, Effect::text.family};
   bool acts = false;
   for (std::size_t c = 0; c < components.size(); ++c) {
     const EffectNumber& number = at_nominal[components[c].number];
@@ -97,7 +98,8 @@ void add_deviations(const Machine& declared, std::vector<Candidate>& all) {
     all.push_back({"deviation",
                    p.key,
                    {{p.key, kDeviation * std::abs(p.in_unit()), p.range.min, p.range.max, false}},
-                   {}});
+                   {},
+                   Family::nc});
   }
 }
 

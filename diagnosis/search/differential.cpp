@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "diagnosis/search/evidence.hpp"
+#include "diagnosis/search/fitted_machine.hpp"
 #include "diagnosis/search/freed_number.hpp"
-#include "diagnosis/search/selection.hpp"
 
 namespace vcnc {
 namespace {

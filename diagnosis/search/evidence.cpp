@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "diagnosis/search/freed_number.hpp"
 #include "diagnosis/search/parallel.hpp"
 #include "model/axes.hpp"
 
@@ -12,6 +13,10 @@ namespace {
 
 /// An axis stands when its command moved less than this in each of the last and next 25 ms.
 constexpr double kStandingLinear = 0.2e-3, kStandingRotary = 0.2e-3;  // [m/s], [rad/s]
+constexpr double kReach = 0.025;                                      // [s]
+/// Readings are rough where their second differences in that reach are as large, of the usual.
+constexpr double kRough = 8;
+constexpr double kSlowSliding = 20e-3;  // [m/s]
 
 /// sum of a b, in doubles and several at a time.
 double dot(const float* a, const float* b, std::size_t n) {
@@ -62,22 +67,28 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
       raw_valid_[c][k] = std::isfinite(measured_[c][k]) && std::isfinite(declared_[c][k]);
   }
   mask_standing();
+  mask_turning_drag();
 
   SeriesOfChannels difference = measured_;
   for (std::size_t c = 0; c < channels.size(); ++c)
     for (std::size_t k = 0; k < difference[c].size(); ++k)
       difference[c][k] = raw_valid_[c][k] ? measured_[c][k] - declared_[c][k] : kMissing;
+  take_out_shifts(declared, difference);
   noise_ = audit_noise(record, partition_, channels, difference);
   for (ChannelNoise& channel : noise_.channels) channel.filter.scale *= noise_scale;
 
   for (std::size_t c = 0; c < channels.size(); ++c) {
     valid_.emplace_back(record.samples(), 0);
     const std::size_t order = noise_.channels[c].filter.a.size();
+    fitted_count_.push_back(0);
+    held_out_count_.push_back(0);
     for (const Block& block : partition_.blocks) {
+      double& count = block.held_out ? held_out_count_[c] : fitted_count_[c];
       std::size_t run = 0;  // valid samples before k
       for (std::size_t k = block.begin; k-- > 0 && run < order && raw_valid_[c][k];) ++run;
       for (std::size_t k = block.begin; k < block.end; ++k) {
         valid_[c][k] = raw_valid_[c][k] && run >= order;
+        count += valid_[c][k];
         run = raw_valid_[c][k] ? run + 1 : 0;
       }
     }
@@ -85,7 +96,7 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
 }
 
 void Evidence::mask_standing() {
-  const auto reach = static_cast<std::size_t>(std::round(0.025 / record_.period));
+  const auto reach = static_cast<std::size_t>(std::round(kReach / record_.period));
   for (std::size_t c = 0; c < raw_valid_.size(); ++c) {
     const ComparedChannel& channel = replica_.channels()[c];
     if (channel.kind != SignalKind::force && channel.kind != SignalKind::twist) continue;
@@ -100,6 +111,89 @@ void Evidence::mask_standing() {
       if (std::abs(q[k] - q[before]) < slow || std::abs(q[after] - q[k]) < slow)
         raw_valid_[c][k] = 0;
     }
+  }
+}
+
+void Evidence::mask_turning_drag() {
+  const auto reach = static_cast<std::size_t>(std::round(kReach / record_.period));
+  const std::size_t n = record_.samples();
+  std::vector<double> squared_speed(n, 0.0);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const MeasuredSignal* command = record_.find(SignalKind::command, axis);
+    if (!command) return;
+    for (std::size_t k = 1; k < n; ++k) {
+      const double v = (command->value[k] - command->value[k - 1]) / record_.period;
+      squared_speed[k] += v * v;
+    }
+  }
+  for (std::size_t c = 0; c < raw_valid_.size(); ++c) {
+    if (replica_.channels()[c].kind != SignalKind::deflection) continue;
+    std::vector<double> second(n, 0.0), present;  // squares of second differences of the residual
+    for (std::size_t k = 2; k < n; ++k) {
+      if (!raw_valid_[c][k] || !raw_valid_[c][k - 1] || !raw_valid_[c][k - 2]) continue;
+      const auto r = [&](std::size_t i) { return measured_[c][i] - declared_[c][i]; };
+      const double d = r(k) - 2 * r(k - 1) + r(k - 2);
+      second[k] = d * d;
+      present.push_back(second[k]);
+    }
+    if (present.empty()) continue;
+    const auto middle = present.begin() + static_cast<std::ptrdiff_t>(present.size() / 2);
+    std::nth_element(present.begin(), middle, present.end());
+    constexpr double kMedianOfSquare = 0.455;  // of a normal deviate
+    const double most = kRough * kRough * *middle / kMedianOfSquare;
+    std::vector<double> sum(n + 1, 0.0);
+    for (std::size_t k = 0; k < n; ++k) sum[k + 1] = sum[k] + second[k];
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::size_t first = k > reach ? k - reach : 0, last = std::min(n, k + reach + 1);
+      const double mean = (sum[last] - sum[first]) / static_cast<double>(last - first);
+      if (mean > most && squared_speed[k] < kSlowSliding * kSlowSliding) raw_valid_[c][k] = 0;
+    }
+  }
+}
+
+void Evidence::take_out_shifts(const Machine& declared, SeriesOfChannels& difference) const {
+  constexpr const char* kShifts[] = {"effects.setup.piece_offset.shift_um.x",
+                                     "effects.setup.piece_offset.shift_um.y",
+                                     "effects.setup.piece_offset.shift_um.z"};
+  constexpr double kShift = 10;  // [um]
+  std::vector<std::size_t> readings;
+  for (std::size_t c = 0; c < difference.size(); ++c)
+    if (replica_.channels()[c].kind == SignalKind::deflection) readings.push_back(c);
+  if (readings.empty() || !partition_.repeated) return;
+  std::vector<Machine> shifted;
+  for (const char* key : kShifts) {
+    shifted.push_back(declared);
+    move_number(shifted.back(), key, number_of(declared, key) + kShift);
+  }
+  const std::vector<Prediction> answers = predict_all(shifted);
+  constexpr Eigen::Index kColumns = 6;  // each shift, constant and growing
+  for (const Stretch& lap : partition_.stretches) {
+    const auto row = [&](std::size_t c, std::size_t k) {
+      Eigen::Matrix<double, kColumns, 1> x;
+      const double t =
+          static_cast<double>(k - lap.begin) / static_cast<double>(lap.end - lap.begin);
+      for (Eigen::Index j = 0; j < 3; ++j) {
+        const double d = answers[static_cast<std::size_t>(j)][c][k] - declared_[c][k];
+        x[j] = std::isfinite(d) ? d / kShift : 0;
+        x[3 + j] = x[j] * (t - 0.5);
+      }
+      return x;
+    };
+    Eigen::Matrix<double, kColumns, kColumns> products =
+        Eigen::Matrix<double, kColumns, kColumns>::Zero();
+    Eigen::Matrix<double, kColumns, 1> with_difference = Eigen::Matrix<double, kColumns, 1>::Zero();
+    for (const std::size_t c : readings)
+      for (std::size_t k = lap.begin; k < lap.end; ++k) {
+        if (!raw_valid_[c][k]) continue;
+        const auto x = row(c, k);
+        products += x * x.transpose();
+        with_difference += x * difference[c][k];
+      }
+    products.diagonal().array() += 1e-9 * products.diagonal().maxCoeff() + 1e-300;
+    const Eigen::Matrix<double, kColumns, 1> shift = products.ldlt().solve(with_difference);
+    for (const std::size_t c : readings)
+      for (std::size_t k = lap.begin; k < lap.end; ++k)
+        if (raw_valid_[c][k]) difference[c][k] -= shift.dot(row(c, k));
   }
 }
 
@@ -186,11 +280,8 @@ Column Evidence::whiten(const SeriesOfChannels& change) const {
 }
 
 double Evidence::count(std::size_t channel, Role role) const {
-  double n = 0;
-  for (const Block& block : partition_.blocks)
-    if (takes(block, role))
-      for (std::size_t k = block.begin; k < block.end; ++k) n += valid_[channel][k];
-  return n;
+  return (role == Role::held_out ? 0 : fitted_count_[channel]) +
+         (role == Role::fitted ? 0 : held_out_count_[channel]);
 }
 
 double Evidence::count(Role role) const {
@@ -218,6 +309,12 @@ double Evidence::chi2(const Column& column, Role role) const {
   return sum;
 }
 
+std::vector<double> Evidence::chi2_of(const Column& column, Role role) const {
+  std::vector<double> all;
+  for (std::size_t c = 0; c < column.size(); ++c) all.push_back(chi2(column, c, role));
+  return all;
+}
+
 double Evidence::rms(const Prediction& prediction, std::size_t channel, Role role) const {
   double sum = 0, n = 0;
   for (const Block& block : partition_.blocks) {
@@ -232,40 +329,56 @@ double Evidence::rms(const Prediction& prediction, std::size_t channel, Role rol
   return n > 0 ? std::sqrt(sum / n) : 0;
 }
 
+void Evidence::add_products(const std::vector<const Column*>& columns, std::size_t channel,
+                            const Block& block, Eigen::MatrixXd& to) {
+  std::vector<std::size_t> present;
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    if (!(*columns[i])[channel].empty()) present.push_back(i);
+  if (present.empty()) return;
+  const auto length = static_cast<Eigen::Index>(block.end - block.begin),
+             width = static_cast<Eigen::Index>(present.size());
+  Eigen::MatrixXd part(length, width);
+  for (Eigen::Index i = 0; i < width; ++i) {
+    const std::vector<float>& z = (*columns[present[static_cast<std::size_t>(i)]])[channel];
+    part.col(i) = Eigen::Map<const Eigen::VectorXf>(z.data() + block.begin, length).cast<double>();
+  }
+  const Eigen::MatrixXd products = part.transpose() * part;
+  for (Eigen::Index i = 0; i < width; ++i)
+    for (Eigen::Index j = 0; j < width; ++j)
+      to(static_cast<Eigen::Index>(present[static_cast<std::size_t>(i)]),
+         static_cast<Eigen::Index>(present[static_cast<std::size_t>(j)])) += products(i, j);
+}
+
 BlockGrams Evidence::grams(const std::vector<const Column*>& columns) const {
   const auto m = static_cast<Eigen::Index>(columns.size());
   BlockGrams all(partition_.blocks.size());
   parallel_for(all.size(), [&](std::size_t b) {
-    const Block& block = partition_.blocks[b];
-    const auto length = static_cast<Eigen::Index>(block.end - block.begin);
     all[b] = Eigen::MatrixXd::Zero(m, m);
-    for (std::size_t c = 0; c < valid_.size(); ++c) {
-      std::vector<Eigen::Index> present;
-      for (Eigen::Index i = 0; i < m; ++i)
-        if (!(*columns[static_cast<std::size_t>(i)])[c].empty()) present.push_back(i);
-      if (present.empty()) continue;
-      const auto width = static_cast<Eigen::Index>(present.size());
-      Eigen::MatrixXd part(length, width);
-      for (Eigen::Index i = 0; i < width; ++i) {
-        const std::vector<float>& z =
-            (*columns[static_cast<std::size_t>(present[static_cast<std::size_t>(i)])])[c];
-        part.col(i) =
-            Eigen::Map<const Eigen::VectorXf>(z.data() + block.begin, length).cast<double>();
-      }
-      const Eigen::MatrixXd products = part.transpose() * part;
-      for (Eigen::Index i = 0; i < width; ++i)
-        for (Eigen::Index j = 0; j < width; ++j)
-          all[b](present[static_cast<std::size_t>(i)], present[static_cast<std::size_t>(j)]) +=
-              products(i, j);
-    }
+    for (std::size_t c = 0; c < valid_.size(); ++c)
+      add_products(columns, c, partition_.blocks[b], all[b]);
   });
+  return all;
+}
+
+RoleGrams Evidence::products(const std::vector<const Column*>& columns) const {
+  const auto m = static_cast<Eigen::Index>(columns.size());
+  RoleGrams all = RoleGrams::none(m, m, valid_.size());
+  std::vector<Eigen::MatrixXd> fitted = all.held_out_of;
+  parallel_for(valid_.size(), [&](std::size_t c) {
+    for (const Block& block : partition_.blocks)
+      add_products(columns, c, block, block.held_out ? all.held_out_of[c] : fitted[c]);
+  });
+  for (std::size_t c = 0; c < valid_.size(); ++c) {
+    all.fitted += fitted[c];
+    all.held_out += all.held_out_of[c];
+  }
   return all;
 }
 
 RoleGrams Evidence::cross(const std::vector<const Column*>& a,
                           const std::vector<const Column*>& b) const {
   const auto rows = static_cast<Eigen::Index>(a.size()), cols = static_cast<Eigen::Index>(b.size());
-  RoleGrams all{Eigen::MatrixXd::Zero(rows, cols), Eigen::MatrixXd::Zero(rows, cols)};
+  RoleGrams all = RoleGrams::none(rows, cols, valid_.size());
   for (std::size_t c = 0; c < valid_.size(); ++c) {
     for (std::size_t j = 0; j < b.size(); ++j) {
       const std::vector<float>& y = (*b[j])[c];
@@ -274,11 +387,12 @@ RoleGrams Evidence::cross(const std::vector<const Column*>& a,
         const std::vector<float>& x = (*a[i])[c];
         if (x.empty()) continue;
         for (const Block& block : partition_.blocks)
-          (block.held_out ? all.held_out : all.fitted)(static_cast<Eigen::Index>(i),
-                                                       static_cast<Eigen::Index>(j)) +=
+          (block.held_out ? all.held_out_of[c] : all.fitted)(static_cast<Eigen::Index>(i),
+                                                             static_cast<Eigen::Index>(j)) +=
               dot(&x[block.begin], &y[block.begin], block.end - block.begin);
       }
     }
+    all.held_out += all.held_out_of[c];
   }
   return all;
 }

@@ -6,8 +6,9 @@
 // needs are products of such columns, kept per block of the partition: from them come chi-square on
 // fitted and held-out laps, normal equations, gains per condition and resampled laps.
 //
-// Masked are samples that are missing, those outside every stretch, and force and twist of an axis
-// that stands: stuck friction and the loop's integral are not predictable there.
+// Masked are samples that are missing, those outside every stretch, force and twist of an axis that
+// stands (stuck friction and the loop's integral are not predictable there), and readings that are
+// rough while the ball slides slowly: the drag on it turns over, nobody can tell when.
 #pragma once
 
 #include <Eigen/Dense>
@@ -21,6 +22,7 @@
 #include "diagnosis/search/gathering.hpp"
 #include "diagnosis/search/noise_audit.hpp"
 #include "diagnosis/search/partition.hpp"
+#include "diagnosis/search/role_grams.hpp"
 
 namespace vcnc {
 
@@ -51,11 +53,6 @@ using SeriesOfChannels = std::vector<std::vector<double>>;
 
 /// Products of columns, one matrix per block.
 using BlockGrams = std::vector<Eigen::MatrixXd>;
-
-/// Products summed over the fitted and over the held-out blocks.
-struct RoleGrams {
-  Eigen::MatrixXd fitted, held_out;
-};
 
 enum class Role { fitted, held_out, both };
 
@@ -95,12 +92,16 @@ class Evidence {
   /// chi-square of one channel of a column.
   double chi2(const Column& column, std::size_t channel, Role role) const;
   double chi2(const Column& column, Role role) const;
+  /// Of every channel.
+  std::vector<double> chi2_of(const Column& column, Role role) const;
   /// RMS of y - yhat in SI over the samples that count.
   double rms(const Prediction& prediction, std::size_t channel, Role role) const;
 
   /// Products of all pairs of the columns, per block.
   BlockGrams grams(const std::vector<const Column*>& columns) const;
   Eigen::MatrixXd sum(const BlockGrams& grams, Role role) const;
+  /// The same, summed over the blocks of each role.
+  RoleGrams products(const std::vector<const Column*>& columns) const;
   /// Products of every `a` with every `b`, summed over the blocks of each role.
   RoleGrams cross(const std::vector<const Column*>& a, const std::vector<const Column*>& b) const;
 
@@ -111,6 +112,13 @@ class Evidence {
   std::vector<float> whiten(std::size_t channel, const std::vector<double>& series) const;
   bool keep_comparable(std::size_t channel, std::vector<double>& change) const;
   void mask_standing();
+  void mask_turning_drag();
+  /// Takes out of every lap what a piece that shifts during the run would make of its readings:
+  /// that drifts from lap to lap and is no noise.
+  void take_out_shifts(const Machine& declared, SeriesOfChannels& difference) const;
+  /// Adds the products in one block and channel.
+  static void add_products(const std::vector<const Column*>& columns, std::size_t channel,
+                           const Block& block, Eigen::MatrixXd& to);
 
   const Record& record_;
   Replica& replica_;
@@ -119,6 +127,7 @@ class Evidence {
   SeriesOfChannels measured_;
   Prediction declared_;
   std::vector<std::vector<char>> raw_valid_, valid_;
+  std::vector<double> fitted_count_, held_out_count_;  ///< of valid_, per channel
   NoiseAudit noise_;
 };
 

@@ -80,6 +80,17 @@ Machine with(Machine machine, const std::vector<FreedNumber>& numbers) {
   return machine;
 }
 
+void adopt(std::vector<FreedNumber>& numbers, const std::vector<FreedNumber>& from) {
+  for (FreedNumber& n : numbers)
+    for (const FreedNumber& f : from)
+      if (f.number.key == n.number.key) n.value = f.value;
+}
+
+bool has_key(const std::vector<FreedNumber>& numbers, const std::string& key) {
+  return std::any_of(numbers.begin(), numbers.end(),
+                     [&](const FreedNumber& n) { return n.number.key == key; });
+}
+
 std::vector<FreedNumber> nuisances(const Machine& declared) {
   Machine copy = declared;
   std::vector<FreedNumber> all;

@@ -30,6 +30,9 @@ double number_of(const Machine& machine, const std::string& key);
 /// Like set_parameter(), but what is out of range becomes the nearest that is allowed.
 void move_number(Machine& machine, const std::string& key, double value);
 Machine with(Machine machine, const std::vector<FreedNumber>& numbers);
+/// Gives numbers the values that those of the same keys have in `from`.
+void adopt(std::vector<FreedNumber>& numbers, const std::vector<FreedNumber>& from);
+bool has_key(const std::vector<FreedNumber>& numbers, const std::string& key);
 
 /// Declared numbers that are never exact, with their tolerances (standard deviations):
 ///

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "diagnosis/search/parallel.hpp"
+#include "diagnosis/search/screening.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {
@@ -87,8 +88,20 @@ class Laws {
         for (const Covariate c : {position, velocity, acceleration})
           add(Point::displacement, c, j, time);
       }
+      if (!is_read(i)) continue;
+      for (std::size_t j = 0; j < kAxisCount; ++j)
+        if (moves_[j]) add(Point::reading, position, j, time);
+      add(Point::reading, time, i, time);
     }
     return laws;
+  }
+
+  /// Whether the record has this component of the probe's reading.
+  bool is_read(std::size_t component) const {
+    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
+    return std::any_of(channels.begin(), channels.end(), [&](const ComparedChannel& c) {
+      return c.kind == SignalKind::deflection && c.axis == component;
+    });
   }
 
   std::vector<Column> columns(const Law& law) const {
@@ -227,6 +240,12 @@ class Laws {
     const Series y = strength(law);
     SeriesOfChannels p(channels.size(), Series(y.size(), 0.0));
     Series motion = y;
+    if (law.point == Law::Point::reading) {
+      for (std::size_t c = 0; c < channels.size(); ++c)
+        if (channels[c].kind == SignalKind::deflection && channels[c].axis == law.axis_index())
+          p[c] = y;
+      return p;
+    }
     if (law.point == Law::Point::table_force) {
       const auto lead = static_cast<std::size_t>(std::round(kPulse / period_));
       motion.assign(y.size(), 0.0);
@@ -259,21 +278,14 @@ LinearLaw fit(const Evidence& evidence, const Ground& ground, const std::vector<
   std::vector<const Column*> own;
   for (const Column& c : columns) own.push_back(&c);
   const RoleGrams across = evidence.cross(ground.columns, own), among = evidence.cross(own, own);
-  const auto border = [](const Eigen::MatrixXd& a, const Eigen::MatrixXd& x,
-                         const Eigen::MatrixXd& b) {
-    Eigen::MatrixXd m(a.rows() + b.rows(), a.cols() + b.cols());
-    m << a, x, x.transpose(), b;
-    return m;
-  };
   const Eigen::Index n = ground.precision.size(), k = among.fitted.rows();
   Eigen::VectorXd precision = Eigen::VectorXd::Zero(n + k), offset = Eigen::VectorXd::Zero(n + k);
   precision.head(n) = ground.precision;
   offset.head(n) = ground.offset;
   precision.tail(k).setConstant(1e-4 * among.fitted.diagonal().mean());
-  const Eigen::MatrixXd fitted = border(ground.grams.fitted, across.fitted, among.fitted);
-  const LinearStep s = linear_step(
-      fitted, border(ground.grams.held_out, across.held_out, among.held_out), precision, offset);
-  Eigen::MatrixXd a = fitted.bottomRightCorner(n + k, n + k);
+  const RoleGrams all = bordered(ground.grams, across, among);
+  const LinearStep s = linear_step(all.fitted, all.held_out, precision, offset);
+  Eigen::MatrixXd a = all.fitted.bottomRightCorner(n + k, n + k);
   a.diagonal() += precision;
   LinearLaw law;
   law.value = s.step.tail(k);
@@ -304,7 +316,7 @@ std::string words_of(const Law& law) {
                      kAxisNames[law.axis_index()], factor, named(law.over, law.over_axis));
 }
 
-LawFit best_law(const Evidence& evidence, const FittedMachine& at,
+LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& doubt,
                 const DiagnosisOptions& options) {
   const Laws laws(evidence, at);
   const LinearPart linear = at.linear();
@@ -330,7 +342,9 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at,
     Machine machine = at.machine;
     machine.effects.laws.push_back(law);
     const Column residual = evidence.residual(evidence.predict(machine));
-    const double gain = ground.held_out - Ground(evidence, residual, linear).held_out;
+    const Ground left(evidence, residual, linear);
+    const double gain =
+        counted(ground.held_out - left.held_out, ground.held_out_of, left.held_out_of, doubt);
     if (gain <= best.gain) continue;
     best.gain = gain;
     best.machine = std::move(machine);

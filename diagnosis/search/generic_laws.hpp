@@ -16,7 +16,9 @@
 #include <vector>
 
 #include "diagnosis/report/diagnosis.hpp"
-#include "diagnosis/search/selection.hpp"
+#include "diagnosis/search/counted_gain.hpp"
+#include "diagnosis/search/diagnosis_options.hpp"
+#include "diagnosis/search/fitted_machine.hpp"
 
 namespace vcnc {
 
@@ -27,7 +29,9 @@ struct LawFit {
 };
 
 /// The best law on what `at` leaves, or one with gain 0.
-LawFit best_law(const Evidence& evidence, const FittedMachine& at, const DiagnosisOptions& options);
+/// `doubt`: of gains, see counted_gain.hpp.
+LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& doubt,
+                const DiagnosisOptions& options);
 
 /// "force on X as sgn(v_X) f(q_X)"
 std::string words_of(const Law& law);

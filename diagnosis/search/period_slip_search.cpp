@@ -25,6 +25,21 @@ int periods_in(double step, double period) {
   return std::abs(step / period - n) < kOff ? static_cast<int>(n) : 0;
 }
 
+/// Whether what follows from k on is nearer to nothing without the step: in the laps, if there are.
+bool stays(const Record& record, const Series& r, std::size_t k, double step) {
+  double with = 0, without = 0;
+  const auto add = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = std::max(begin, k); i < end; ++i) {
+      if (!std::isfinite(r[i])) continue;
+      with += r[i] * r[i];
+      without += (r[i] - step) * (r[i] - step);
+    }
+  };
+  for (const Stretch& s : record.stretches) add(s.begin, s.end);
+  if (record.stretches.empty()) add(k, r.size());
+  return without < with;
+}
+
 }  // namespace
 
 std::optional<PeriodSlip> find_period_slip(const Record& record,
@@ -44,7 +59,8 @@ std::optional<PeriodSlip> find_period_slip(const Record& record,
     const Series& r = residual[c];
     for (std::size_t k = kReach; k + kReach <= r.size(); ++k) {
       const int n = periods_in(r[k] - r[k - 1], period);
-      if (n == 0 || periods_in(step_at(r, k), period) != n) continue;
+      if (n == 0 || periods_in(step_at(r, k), period) != n || !stays(record, r, k, n * period))
+        continue;
       const bool alone = std::all_of(residual.begin(), residual.end(), [&](const Series& other) {
         return &other == &r || !(std::abs(other[k] - other[k - 1]) > kQuietBeside * period);
       });

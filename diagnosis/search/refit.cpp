@@ -25,28 +25,16 @@ class Products {
  public:
   Products(const Evidence& evidence, const std::vector<Column>& linear)
       : evidence_(evidence), linear_(pointers(linear)) {
-    if (linear_.empty()) return;
-    const BlockGrams blocks = evidence.grams(linear_);
-    own_ = {evidence.sum(blocks, Role::fitted), evidence.sum(blocks, Role::held_out)};
+    own_ = evidence.products(linear_);
   }
 
   RoleGrams with(const Column& z, const std::vector<Column>& live) const {
     std::vector<const Column*> first{&z};
     for (const Column& c : live) first.push_back(&c);
-    const RoleGrams corner = evidence_.cross(first, first), side = evidence_.cross(first, linear_);
-    return {bordered(corner.fitted, side.fitted, own_.fitted),
-            bordered(corner.held_out, side.held_out, own_.held_out)};
+    return bordered(evidence_.cross(first, first), evidence_.cross(first, linear_), own_);
   }
 
  private:
-  static Eigen::MatrixXd bordered(const Eigen::MatrixXd& a, const Eigen::MatrixXd& cross,
-                                  const Eigen::MatrixXd& b) {
-    if (b.size() == 0) return a;
-    Eigen::MatrixXd all(a.rows() + b.rows(), a.cols() + b.cols());
-    all << a, cross, cross.transpose(), b;
-    return all;
-  }
-
   const Evidence& evidence_;
   std::vector<const Column*> linear_;
   RoleGrams own_;
@@ -136,12 +124,8 @@ LinearStep linear_step(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& hel
   s.step = n > 0 ? Eigen::VectorXd(a.ldlt().solve(b)) : Eigen::VectorXd();
   const Eigen::VectorXd at = offset + s.step;
   const double prior = at.dot(precision.cwiseProduct(at));
-  const auto left = [&](const Eigen::MatrixXd& g) {
-    return g(0, 0) - 2 * s.step.dot(g.block(1, 0, n, 1).col(0)) +
-           s.step.dot(g.block(1, 1, n, n) * s.step) + prior;
-  };
-  s.fitted = left(fitted);
-  s.held_out = left(held_out);
+  s.fitted = left_after(fitted, s.step) + prior;
+  s.held_out = left_after(held_out, s.step) + prior;
   return s;
 }
 
@@ -253,6 +237,7 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
   result.residual = std::move(best.residual);
   result.columns = std::move(best.columns);
   result.linear_step = step.step;
+  result.held_out_of = left_after(grams.held_out_of, step.step);
   return result;
 }
 

@@ -48,6 +48,7 @@ struct Refit {
   Column residual;                        ///< of that prediction
   std::vector<Column> columns;            ///< of the live numbers at the solution
   Eigen::VectorXd linear_step;            ///< of the linear numbers, in typical sizes
+  std::vector<double> held_out_of;        ///< chi-square per channel, without priors
   int simulations = 0;
 };
 

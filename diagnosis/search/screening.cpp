@@ -16,13 +16,6 @@ Eigen::VectorXd padded(const Eigen::VectorXd& v, Eigen::Index more) {
   return out;
 }
 
-Eigen::MatrixXd bordered(const Eigen::MatrixXd& a, const Eigen::MatrixXd& cross,
-                         const Eigen::MatrixXd& b) {
-  Eigen::MatrixXd all(a.rows() + b.rows(), a.cols() + b.cols());
-  all << a, cross, cross.transpose(), b;
-  return all;
-}
-
 std::vector<const Column*> pointers(const std::vector<Column>& columns) {
   std::vector<const Column*> all;
   for (const Column& c : columns) all.push_back(&c);
@@ -30,24 +23,23 @@ std::vector<const Column*> pointers(const std::vector<Column>& columns) {
 }
 
 struct Gain {
-  double gain = 0;
+  double gain = 0, counted = 0;
   Eigen::VectorXd size;
 };
 
 /// Of columns with the products `across` with the ground and their `own`.
-Gain gain_of(const Ground& ground, const RoleGrams& across, const RoleGrams& own) {
+Gain gain_of(const Ground& ground, const Doubt& doubt, const RoleGrams& across,
+             const RoleGrams& own) {
   const Eigen::Index more = own.fitted.rows();
-  const LinearStep full =
-      linear_step(bordered(ground.grams.fitted, across.fitted, own.fitted),
-                  bordered(ground.grams.held_out, across.held_out, own.held_out),
-                  padded(ground.precision, more), padded(ground.offset, more));
-  return {ground.held_out - full.held_out, full.step.tail(more)};
-}
-
-Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
-  Eigen::MatrixXd both(a.rows(), a.cols() + b.cols());
-  both << a, b;
-  return both;
+  const RoleGrams all = bordered(ground.grams, across, own);
+  const LinearStep full = linear_step(all.fitted, all.held_out, padded(ground.precision, more),
+                                      padded(ground.offset, more));
+  const double gain = ground.held_out - full.held_out;
+  return {gain,
+          gain > 0 && !doubt.empty()
+              ? counted(gain, ground.held_out_of, left_after(all.held_out_of, full.step), doubt)
+              : gain,
+          full.step.tail(more)};
 }
 
 /// Whether the sizes are of a kind the candidate can have.
@@ -67,6 +59,31 @@ bool possible(const Candidate& candidate, const Trial& trial, const Eigen::Vecto
   return any;
 }
 
+constexpr double kDeviations = 5;  ///< of a number that is seen at all
+
+/// Steps at which as much gain counts as is needed, from the gain of one step in each channel.
+double steps_to(const std::vector<double>& per_step, const Needed& needed) {
+  const auto counts = [&](double squared) {
+    double sum = 0;
+    for (std::size_t c = 0; c < per_step.size(); ++c)
+      sum += std::max(0.0, per_step[c] * squared - (needed.doubt.empty() ? 0 : needed.doubt[c]));
+    return sum;
+  };
+  double low = 1e-24, high = 1e24;
+  if (counts(high) < needed.counted_gain) return std::numeric_limits<double>::infinity();
+  while (high / low > 1.0001) {
+    const double middle = std::sqrt(low * high);
+    (counts(middle) < needed.counted_gain ? low : high) = middle;
+  }
+  return std::sqrt(high);
+}
+
+/// Steps at which one consequence at least is what is needed.
+double steps_to(const Consequence& per_step, const Consequence& needed) {
+  return std::min(needed.contour_um / per_step.contour_um,
+                  needed.of_noise_but_readings / per_step.of_noise_but_readings);
+}
+
 }  // namespace
 
 std::vector<TrialColumns> simulate_trials(const Evidence& evidence, const Machine& base,
@@ -79,6 +96,7 @@ std::vector<TrialColumns> simulate_trials(const Evidence& evidence, const Machin
   for (std::size_t t = 0; t < trials.size(); ++t) {
     all[t].trial = std::move(trials[t]);
     all[t].columns.resize(all[t].trial.directions.size());
+    all[t].consequence.resize(all[t].columns.size());
     for (std::size_t d = 0; d < all[t].columns.size(); ++d) jobs.emplace_back(t, d);
   }
   // Those of one place together: they move the same axis.
@@ -104,7 +122,9 @@ std::vector<TrialColumns> simulate_trials(const Evidence& evidence, const Machin
     std::vector<Prediction> predictions = evidence.predict_all(changed);
     for (std::size_t j = first; j < last; ++j) {
       Prediction& p = predictions[j - first];
-      all[jobs[j].first].columns[jobs[j].second] = evidence.sensitivity(prediction, p, 1);
+      const auto& [t, d] = jobs[j];
+      all[t].columns[d] = evidence.sensitivity(prediction, p, 1);
+      all[t].consequence[d] = consequence(evidence, p, prediction);
       p.clear();
     }
     const double share = static_cast<double>(++done) / static_cast<double>(parts);
@@ -132,7 +152,7 @@ void RememberedProducts::learn(const Evidence& evidence, const std::vector<const
   const RoleGrams fresh = evidence.cross(missing, pointers(columns));
   const auto rows = static_cast<Eigen::Index>(others.size()),
              cols = static_cast<Eigen::Index>(columns.size());
-  RoleGrams all{Eigen::MatrixXd(rows, cols), Eigen::MatrixXd(rows, cols)};
+  RoleGrams all = RoleGrams::none(rows, cols, fresh.held_out_of.size());
   Eigen::Index next = 0;
   for (Eigen::Index i = 0; i < rows; ++i) {
     const auto r = known(others[static_cast<std::size_t>(i)]);
@@ -141,6 +161,8 @@ void RememberedProducts::learn(const Evidence& evidence, const std::vector<const
     const Eigen::Index row = old ? r - others_.begin() : next++;
     all.fitted.row(i) = from.fitted.row(row);
     all.held_out.row(i) = from.held_out.row(row);
+    for (std::size_t c = 0; c < all.held_out_of.size(); ++c)
+      all.held_out_of[c].row(i) = from.held_out_of[c].row(row);
   }
   products_ = std::move(all);
   others_.clear();
@@ -150,12 +172,13 @@ void RememberedProducts::learn(const Evidence& evidence, const std::vector<const
 Ground::Ground(const Evidence& evidence, const Column& residual, const LinearPart& linear)
     : columns{&residual}, precision(linear.precision()), offset(linear.offset()) {
   for (const Column& c : linear.columns) columns.push_back(&c);
-  const BlockGrams blocks = evidence.grams(columns);
-  grams = {evidence.sum(blocks, Role::fitted), evidence.sum(blocks, Role::held_out)};
-  held_out = linear_step(grams.fitted, grams.held_out, precision, offset).held_out;
+  grams = evidence.products(columns);
+  const LinearStep at = linear_step(grams.fitted, grams.held_out, precision, offset);
+  held_out = at.held_out;
+  held_out_of = left_after(grams.held_out_of, at.step);
 }
 
-void find_detection_limits(const Evidence& evidence, const Ground& ground,
+void find_detection_limits(const Evidence& evidence, const Ground& ground, const Needed& needed,
                            std::vector<TrialColumns>& trials) {
   const Eigen::Index n = ground.precision.size();
   Eigen::MatrixXd a = (ground.grams.fitted + ground.grams.held_out).block(1, 1, n, n);
@@ -166,21 +189,53 @@ void find_detection_limits(const Evidence& evidence, const Ground& ground,
     TrialColumns& t = trials[i];
     t.ground.learn(evidence, ground.columns, t.columns);
     const RoleGrams& across = t.ground.products();
-    double information = 0;  // of the best direction, in steps
+    constexpr double kNever = std::numeric_limits<double>::infinity();
+    double steps = kNever;  // of the best direction
     for (std::size_t d = 0; d < t.columns.size(); ++d) {
       const auto at = static_cast<Eigen::Index>(d);
       const double all = t.own.fitted(at, at) + t.own.held_out(at, at);
       const Eigen::VectorXd nc = (across.fitted + across.held_out).block(1, at, n, 1);
-      const double left = all - (n > 0 ? nc.dot(factor.solve(nc)) : 0);
+      const Eigen::VectorXd others = n > 0 ? Eigen::VectorXd(factor.solve(nc)) : nc;
+      const double left = all - nc.dot(others);
       // What is left of a column that the others can make up is rounding.
-      if (left > 1e-6 * all) information = std::max(information, left);
+      if (!(left > 1e-6 * all)) continue;
+      std::vector<double> per_step;  // gain in each channel
+      for (std::size_t c = 0; c < across.held_out_of.size(); ++c)
+        per_step.push_back(t.own.held_out_of[c](at, at) -
+                           2 * others.dot(across.held_out_of[c].block(1, at, n, 1).col(0)) +
+                           others.dot(ground.grams.held_out_of[c].block(1, 1, n, n) * others));
+      steps = std::min(steps, std::max({kDeviations / std::sqrt(left), steps_to(per_step, needed),
+                                        steps_to(t.consequence[d], needed.consequence)}));
     }
-    if (information > 0)
-      t.detection_limit = 5 / std::sqrt(information) * std::abs(t.trial.directions.front().step);
+    const Direction& first = t.trial.directions.front();
+    if (first.whole)
+      t.detection_limit = steps <= 1 ? std::abs(t.trial.values[first.number] + first.step) : kNever;
+    else
+      t.detection_limit = steps * std::abs(first.step);
   });
 }
 
-std::vector<Screened> screen(const Evidence& evidence, const Ground& ground,
+std::vector<double> release_limits(const Ground& ground, const std::vector<FreedNumber>& numbers,
+                                   double pull, double gain) {
+  const Eigen::Index n = ground.precision.size();
+  Eigen::MatrixXd a = (ground.grams.fitted + ground.grams.held_out).block(1, 1, n, n);
+  a.diagonal() += ground.precision;
+  a.diagonal().array() += 1e-10 * (1e-6 + a.diagonal().array());
+  const Eigen::MatrixXd inverse = a.ldlt().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
+  std::vector<double> limits(numbers.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const double prior = ground.precision[at], information = 1 / inverse(at, at) - prior;
+    if (prior <= 0 || information <= 1e-6 * prior) continue;
+    // What data and tolerance agree on is information / (information + prior) of the change.
+    const double pulled = pull / std::sqrt(prior) * (information + prior) / information;
+    const double gained = std::sqrt(gain * (1 / prior + 1 / information));
+    limits[i] = std::max(pulled, gained) * numbers[i].number.typical;
+  }
+  return limits;
+}
+
+std::vector<Screened> screen(const Evidence& evidence, const Ground& ground, const Doubt& doubt,
                              const std::vector<Candidate>& candidates,
                              std::vector<TrialColumns>& trials) {
   std::vector<Screened> all(trials.size());
@@ -190,8 +245,9 @@ std::vector<Screened> screen(const Evidence& evidence, const Ground& ground,
     if (std::all_of(t.columns.begin(), t.columns.end(), [](const Column& c) { return c.zero(); }))
       return;
     t.ground.learn(evidence, ground.columns, t.columns);
-    Gain g = gain_of(ground, t.ground.products(), t.own);
-    if (possible(candidates[t.trial.candidate], t.trial, g.size)) all[i].gain = g.gain;
+    Gain g = gain_of(ground, doubt, t.ground.products(), t.own);
+    if (possible(candidates[t.trial.candidate], t.trial, g.size))
+      all[i].gain = g.gain, all[i].counted = g.counted;
     all[i].size = std::move(g.size);
   });
   std::vector<Screened> best;
@@ -207,16 +263,14 @@ std::vector<Screened> screen(const Evidence& evidence, const Ground& ground,
   return best;
 }
 
-double pair_gain(const Evidence& evidence, const Ground& ground, const TrialColumns& a,
-                 const TrialColumns& b, Eigen::VectorXd& size) {
-  const RoleGrams &with_a = a.ground.products(), &with_b = b.ground.products(),
-                  ab = evidence.cross(pointers(a.columns), pointers(b.columns));
-  Gain g = gain_of(ground,
-                   {beside(with_a.fitted, with_b.fitted), beside(with_a.held_out, with_b.held_out)},
-                   {bordered(a.own.fitted, ab.fitted, b.own.fitted),
-                    bordered(a.own.held_out, ab.held_out, b.own.held_out)});
-  size = std::move(g.size);
-  return g.gain;
+Screened screen_pair(const Evidence& evidence, const Ground& ground, const Doubt& doubt,
+                     const std::vector<TrialColumns>& trials, std::size_t first,
+                     std::size_t second) {
+  const TrialColumns &a = trials[first], &b = trials[second];
+  const RoleGrams ab = evidence.cross(pointers(a.columns), pointers(b.columns));
+  Gain g = gain_of(ground, doubt, beside(a.ground.products(), b.ground.products()),
+                   bordered(a.own, ab, b.own));
+  return {first, g.gain, g.counted, std::move(g.size)};
 }
 
 }  // namespace vcnc

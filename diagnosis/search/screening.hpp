@@ -2,14 +2,19 @@
 //
 // Every direction of every trial is simulated once from a base machine. Its whitened columns C and
 // those of the numbers that go along, N, are fitted to the residual of the fitted laps together;
-// what that leaves on the held-out laps against N alone is the gain of the candidate. A detection
-// limit is five standard deviations of a direction by the Cramer-Rao bound, N projected out.
+// what that leaves on the held-out laps against N alone is the gain of the candidate.
+//
+// A detection limit is the size of a direction from which on it would be told: five standard
+// deviations by the Cramer-Rao bound, N projected out, and what its counted gain (counted_gain.hpp)
+// and its consequence must reach to be accepted.
 #pragma once
 
 #include <functional>
 #include <limits>
 #include <vector>
 
+#include "diagnosis/search/consequence.hpp"
+#include "diagnosis/search/counted_gain.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/refit.hpp"
 #include "diagnosis/search/trial.hpp"
@@ -33,14 +38,17 @@ class RememberedProducts {
 struct TrialColumns {
   Trial trial;
   std::vector<Column> columns;
-  RoleGrams own;  ///< products of the columns with each other
+  std::vector<Consequence> consequence;  ///< of each direction, per step
+  RoleGrams own;                         ///< products of the columns with each other
   RememberedProducts ground;
-  double detection_limit = std::numeric_limits<double>::infinity();  ///< of its first number
+  /// Of its first number; where that is a limit, the limit itself if it would be seen.
+  double detection_limit = std::numeric_limits<double>::infinity();
 };
 
 struct Screened {
   std::size_t trial = 0;  ///< index into the columns
   double gain = 0;        ///< held-out chi-square
+  double counted = 0;     ///< the part that counts
   Eigen::VectorXd size;   ///< per direction, in steps
 };
 
@@ -60,20 +68,34 @@ struct Ground {
   std::vector<const Column*> columns;  ///< the residual, then those of the linear numbers
   RoleGrams grams;
   Eigen::VectorXd precision, offset;
-  double held_out = 0;  ///< chi-square with priors, the linear numbers fitted
+  double held_out = 0;              ///< chi-square with priors, the linear numbers fitted
+  std::vector<double> held_out_of;  ///< of it per channel, without priors
+};
+
+/// What an effect must reach to be told.
+struct Needed {
+  double counted_gain = 25;
+  Doubt doubt;
+  Consequence consequence;
 };
 
 /// Fills in the detection limits.
-void find_detection_limits(const Evidence& evidence, const Ground& ground,
+void find_detection_limits(const Evidence& evidence, const Ground& ground, const Needed& needed,
                            std::vector<TrialColumns>& trials);
 
+/// Changes of declared numbers from which on they would be told, in the unit of the key: what takes
+/// them `pull` tolerances away and gains `gain`. Infinity for those without a tolerance.
+std::vector<double> release_limits(const Ground& ground, const std::vector<FreedNumber>& numbers,
+                                   double pull, double gain);
+
 /// Gains of all trials on a residual, the best trial of every candidate, best first.
-std::vector<Screened> screen(const Evidence& evidence, const Ground& ground,
+std::vector<Screened> screen(const Evidence& evidence, const Ground& ground, const Doubt& doubt,
                              const std::vector<Candidate>& candidates,
                              std::vector<TrialColumns>& trials);
 
-/// Gain of two trials together that were screened on this ground.
-double pair_gain(const Evidence& evidence, const Ground& ground, const TrialColumns& a,
-                 const TrialColumns& b, Eigen::VectorXd& size);
+/// Of two trials together that were screened on this ground; `trial` means the first.
+Screened screen_pair(const Evidence& evidence, const Ground& ground, const Doubt& doubt,
+                     const std::vector<TrialColumns>& trials, std::size_t first,
+                     std::size_t second);
 
 }  // namespace vcnc

@@ -23,9 +23,6 @@ bool contains(const std::string& text, const char* part) {
   return text.find(part) != std::string::npos;
 }
 
-/// An amplitude that stands beside a wave and has no phase.
-bool has_no_phase(const FreeNumber& n) { return contains(n.key, "_bow_"); }
-
 }  // namespace
 
 bool is_fixed(const FreeNumber& n) {
@@ -35,6 +32,8 @@ bool is_fixed(const FreeNumber& n) {
 }
 
 bool is_phase(const FreeNumber& n) { return contains(n.key, ".phase_"); }
+
+bool has_no_phase(const FreeNumber& n) { return contains(n.key, "_bow_"); }
 
 bool is_limit(const FreeNumber& n) { return contains(n.key, ".range_clip.limit_"); }
 
@@ -46,7 +45,11 @@ std::vector<Trial> trials(const Machine& base, const std::vector<Candidate>& can
     Trial first{.candidate = c, .values = {}, .directions = {}};
     bool present = false;  // the base machine has it already
     for (std::size_t i = 0; i < candidate.numbers.size(); ++i) {
-      first.values.push_back(number_of(base, candidate.numbers[i].key));
+      // What goes along in every fit is taken anew at every shape: what the base machine has of it
+      // is a multiple of a column that the trial is held against.
+      const std::string& key = candidate.numbers[i].key;
+      first.values.push_back(
+          never_quite_absent(key) && !candidate.shape.empty() ? 0 : number_of(base, key));
       present = present || (!is_shape(candidate, i) && first.values.back() != 0 &&
                             !never_quite_absent(candidate.numbers[i].key));
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 
 #include "diagnosis/search/parallel.hpp"
 #include "model/axes.hpp"
@@ -49,7 +50,8 @@ TrialValuesOf::TrialValuesOf(const Evidence& evidence, const Column& residual)
     : evidence_(evidence),
       duration_(static_cast<double>(evidence.record().samples()) * evidence.record().period),
       wavelengths_(kAxisCount),
-      jump_(find_jump(residual)) {
+      jump_(find_jump(residual)),
+      ringing_(find_ringing(residual)) {
   parallel_for(kAxisCount,
                [&](std::size_t axis) { wavelengths_[axis] = find_wavelengths(axis, residual); });
 }
@@ -133,6 +135,48 @@ double TrialValuesOf::find_jump(const Column& residual) const {
   return at + evidence_.record().begin;
 }
 
+/// Peaks of the periodogram over the median around them; blocks of the fitted laps, Hann's window.
+std::vector<double> TrialValuesOf::find_ringing(const Column& residual) const {
+  constexpr double kLowest = 8, kHighest = 200, kStep = 1;  // [Hz]
+  constexpr std::size_t kBeside = 12, kMost = 3;
+  constexpr double kStandsOut = 3;
+  std::vector<double> power(static_cast<std::size_t>((kHighest - kLowest) / kStep) + 1, 0.0);
+  parallel_for(power.size(), [&](std::size_t i) {
+    const double w =
+        2 * kPi * (kLowest + kStep * static_cast<double>(i)) * evidence_.record().period;
+    for (std::size_t c = 0; c < residual.size(); ++c) {
+      const std::vector<float>& z = residual[c];
+      if (evidence_.replica().channels()[c].kind != SignalKind::deflection || z.empty()) continue;
+      for (const Block& block : evidence_.partition().blocks) {
+        if (block.held_out) continue;
+        const double window = 2 * kPi / static_cast<double>(block.end - block.begin);
+        const std::complex<double> turn = std::polar(1.0, w), slow = std::polar(1.0, window);
+        std::complex<double> sum = 0, wave = 1, hann = 1;
+        for (std::size_t k = block.begin; k < block.end; ++k, wave *= turn, hann *= slow)
+          sum += (1 - hann.real()) * static_cast<double>(z[k]) * wave;
+        power[i] += std::norm(sum);
+      }
+    }
+  });
+  std::vector<std::pair<double, double>> peaks;  // how far it stands out, frequency
+  for (std::size_t i = 1; i + 1 < power.size(); ++i) {
+    if (power[i] < power[i - 1] || power[i] <= power[i + 1]) continue;
+    const std::size_t first = i > kBeside ? i - kBeside : 0,
+                      last = std::min(power.size(), i + kBeside + 1);
+    std::vector<double> around(power.begin() + static_cast<std::ptrdiff_t>(first),
+                               power.begin() + static_cast<std::ptrdiff_t>(last));
+    const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
+    std::nth_element(around.begin(), middle, around.end());
+    if (power[i] > kStandsOut * *middle)
+      peaks.emplace_back(power[i] / *middle, kLowest + kStep * static_cast<double>(i));
+  }
+  std::sort(peaks.rbegin(), peaks.rend());
+  std::vector<double> frequencies;
+  for (const auto& [ratio, frequency] : peaks)
+    if (frequencies.size() < kMost) frequencies.push_back(frequency);
+  return frequencies;
+}
+
 std::vector<double> TrialValuesOf::operator()(const Candidate& candidate,
                                               std::size_t number) const {
   const FreeNumber& n = candidate.numbers[number];
@@ -146,12 +190,14 @@ std::vector<double> TrialValuesOf::operator()(const Candidate& candidate,
     for (const double share : {0.995, 0.97, 0.9, 0.8}) more({share * largest});
   } else if (contains(n.key, "frequency_Hz")) {
     for (const NoiseLine& line : evidence_.noise().lines) more({line.frequency});
+    more(ringing_);
   } else if (contains(n.key, ".time_constant_s")) {
     values.clear();
     for (const double share : {0.1, 0.3, 1.0, 3.0}) more({share * duration_});
   } else if (contains(n.key, ".period_s")) {
     values.clear();
-    for (const double share : {0.25, 0.5, 1.0}) more({share * duration_});
+    // A quarter of a wave in the run's length apart: further off the phase is lost at its end.
+    for (double waves = 0.5; waves <= 5; waves += 0.25) more({duration_ / waves});
   } else if (axis < kAxisCount && (contains(n.key, ".period_") || contains(n.key, "pitch_") ||
                                    contains(n.key, ".wavelength_"))) {
     for (const double w : wavelengths_[axis]) more({w / si_of_unit(n.key)});

@@ -3,8 +3,10 @@
 //   wavelength of an axis effect   lines of the residual over the axis' position: least squares of
 //                                  sine and cosine at every trial wavelength (Lomb 1976), the
 //                                  strongest three; and the typical one
-//   frequency                      lines that do not repeat (noise audit), and the typical one
+//   frequency                      lines that do not repeat (noise audit), those of the residual
+//                                  of the readings that stand out most, and the typical one
 //   time constant                  0.1, 0.3, 1 and 3 times the length of the run
+//   period in time                 half a wave in the run to five, a quarter apart
 //   place along an axis            eight across the travel
 //   instant                        where the residual jumps most
 //   exponent, edge, ...            the typical value, an exponent also above 1
@@ -27,12 +29,14 @@ class TrialValuesOf {
  private:
   std::vector<double> find_wavelengths(std::size_t axis, const Column& residual) const;
   double find_jump(const Column& residual) const;
+  std::vector<double> find_ringing(const Column& residual) const;
   double largest_reading() const;  ///< of the probe [m]
 
   const Evidence& evidence_;
   double duration_ = 0;
   std::vector<std::vector<double>> wavelengths_;  ///< per axis [m or rad]
   double jump_ = 0;                               ///< [s]
+  std::vector<double> ringing_;                   ///< [Hz]
 };
 
 /// Power that sine and cosine of wavelength w over `position` explain of `z`, in squares of z.

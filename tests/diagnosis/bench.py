@@ -338,10 +338,11 @@ are written, and their SHA-256 printed, before anything is diagnosed; every run 
 * **shuffled**: what the first single tests differ from their reference, lap by lap, moved to laps of other conditions. Nothing may be found.
 
 The program is 44 s: circles of 15 mm at F3000 and F6000 in both senses in a ring gauge, circles while C or A turns, strokes of Z;
-everything twice. The ball never comes to rest on the piece but at the ends of a stroke: what the drag of friction does to a ball at
+everything twice. The ring stands 72 mm off the C axis, so that an error of its angle moves the ring. The ball never comes to rest on the piece but at the ends of a stroke: what the drag of friction does to a ball at
 rest is a matter of nanometres of motion, and the two models need not agree on it. The declared suspension of the probe is light, as the
-generator's contact is quasi-static. L is the detection limit that the diagnosis states itself; sizes are drawn log-uniformly within a factor of three
-about a typical one, so that some lie below L, where silence is right. Noise effects, the set-up and what happens before
+generator's contact is quasi-static. L is the detection limit that the diagnosis states itself: five standard
+deviations, and what a gain and a consequence must reach to be told beside what the model gets wrong about the healthy machine. Sizes
+are drawn log-uniformly within a factor of three about a typical one, so that some lie below L, where silence is right. Noise effects, the set-up and what happens before
 the logged command are not injected as findings.
 
 ## The generator itself

@@ -64,6 +64,19 @@ TEST(Diagnose, NamesALawWhereTheLibraryHasNone) {
   EXPECT_EQ(d.verdict, DiagnosisVerdict::unexplained);
 }
 
+TEST(Diagnose, SeveralNamesForWhatOneLawDoesAreTakenAway) {
+  // A kink over the other axis: squareness and others together come near.
+  Record record = measured({}, 4);
+  const std::vector<double>& y = record.find(SignalKind::command, 1)->value;
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::deflection)
+      for (std::size_t k = 0; k < s.value.size(); ++k) s.value[k] += 2e-4 * std::max(0.0, y[k]);
+  const Diagnosis d = diagnosed(record);
+  ASSERT_TRUE(d.law);
+  EXPECT_TRUE(d.effects.empty());
+  EXPECT_EQ(d.law->law.over_axis, Law::OfAxis::Y);
+}
+
 /// Dry friction of 0.15 N under a noise of 2 N: significant over 12 s, and nothing to be told.
 TEST(Diagnose, NotesWhatIsOfNoConsequence) {
   Machine truth;

@@ -1,12 +1,14 @@
 // The parts of the engine against closed forms: filters, solver, partition, limits, intervals.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/least_squares.hpp"
 #include "diagnosis/search/noise_audit.hpp"
 #include "diagnosis/search/selection.hpp"
+#include "diagnosis/search/trial_values.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc {
@@ -95,13 +97,56 @@ TEST(LeastSquares, SolvesRosenbrockWithinBounds) {
   EXPECT_NEAR(s.x[1], 0.25, 1e-4);
 }
 
-TEST(Screening, DetectionLimitIsFiveStandardDeviations) {
+TEST(RoleGrams, StepsLeaveWhatTheyLeaveOfTheColumnsThemselves) {
+  // Two channels; z, a and b are random, the step goes along a and b.
+  const Eigen::Index n = 50;
+  RoleGrams a = RoleGrams::none(2, 2, 2), across = RoleGrams::none(2, 1, 2),
+            b = RoleGrams::none(1, 1, 2);
+  const Eigen::Vector2d step(0.7, -1.3);
+  std::vector<double> left;
+  for (std::size_t c = 0; c < 2; ++c) {
+    Eigen::MatrixXd m(n, 3);  // z, a, b
+    for (Eigen::Index k = 0; k < n; ++k)
+      for (Eigen::Index j = 0; j < 3; ++j)
+        m(k, j) = gaussian_noise(9, c, static_cast<std::size_t>(3 * k + j))[0];
+    a.held_out_of[c] = m.leftCols(2).transpose() * m.leftCols(2);
+    across.held_out_of[c] = (m.transpose() * m).eval().block(0, 2, 2, 1);
+    b.held_out_of[c](0, 0) = m.col(2).squaredNorm();
+    a.held_out += a.held_out_of[c], across.held_out += across.held_out_of[c];
+    b.held_out += b.held_out_of[c];
+    left.push_back((m.col(0) - m.rightCols(2) * step).squaredNorm());
+  }
+  const RoleGrams all = bordered(a, across, b);
+  EXPECT_NEAR(left_after(all.held_out, step), left[0] + left[1], 1e-9);
+  const std::vector<double> of = left_after(all.held_out_of, step);
+  EXPECT_NEAR(of[0], left[0], 1e-9);
+  EXPECT_NEAR(of[1], left[1], 1e-9);
+}
+
+TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {
+  DiagnosisOptions options;
+  options.share_of_found = 0.01;
+  EXPECT_TRUE(doubt_of(options, {}, {500, 600}).empty());
+  EXPECT_EQ(doubt_of(options, {2500, 500}, {500, 600}), (Doubt{20, 0}));
+  options.form_of_channel = {100, 0};
+  options.taken_of_form = 0.5;
+  const Doubt doubt = doubt_of(options, {2500, 500}, {500, 600});
+  EXPECT_EQ(doubt, (Doubt{70, 0}));
+  // 300 of 400 come from the first channel; a loss takes nothing away, a small gain all of itself.
+  EXPECT_DOUBLE_EQ(counted(400, {500, 600}, {200, 500}, doubt), 330);
+  EXPECT_DOUBLE_EQ(counted(60, {500, 600}, {540, 500}, doubt), 60);
+  EXPECT_DOUBLE_EQ(counted(110, {500, 600}, {490, 500}, doubt), 100);
+}
+
+TEST(Screening, DetectionLimitIsWhereTheHeldOutHalfGainsEnough) {
   Record record = toy::commands(1000, 4);
   toy::measure(record, Machine(), 2);
   toy::ToyReplica replica(record);
   Evidence evidence(record, replica, Machine());
   const std::vector<Candidate> all = toy::candidates();
-  const SelectionResult result = select_effects_of(evidence, Machine(), all, {}, {});
+  DiagnosisOptions options;
+  options.least_contour_um = options.least_of_noise = 0;  // whatever the consequence
+  const SelectionResult result = select_effects_of(evidence, Machine(), all, options, {});
   // command_delay: e = -t v in the position with 50 nm of noise, and -t v at the probe with 100 nm.
   double sum = 0;
   const std::vector<double>& x = record.find(SignalKind::command, 0)->value;
@@ -110,8 +155,70 @@ TEST(Screening, DetectionLimitIsFiveStandardDeviations) {
     if (std::abs(a) > 100) continue;
     sum += v * v * (1 / std::pow(toy::kPositionNoise, 2) + 1 / std::pow(toy::kProbeNoise, 2));
   }
-  EXPECT_NEAR(result.trials.front().detection_limit, 5 / std::sqrt(sum) * 1e3,
-              0.05 * 5 / std::sqrt(sum) * 1e3);
+  const double limit = 5 / std::sqrt(sum / 2) * 1e3;  // a gain of 25 on half of the laps
+  EXPECT_NEAR(result.trials.front().detection_limit, limit, 0.05 * limit);
+
+  // Of the part at the probe nothing counts below a gain of 100, of the position all does.
+  double position = 0;
+  for (std::size_t k = 1; k + 1 < x.size(); ++k) {
+    const double v = (x[k + 1] - x[k - 1]) / 2e-3, a = (x[k + 1] - 2 * x[k] + x[k - 1]) / 1e-6;
+    if (std::abs(a) < 100) position += v * v / std::pow(toy::kPositionNoise, 2);
+  }
+  options.form_of_channel = {0, 0, 200};
+  const SelectionResult doubted = select_effects_of(evidence, Machine(), all, options, {});
+  EXPECT_NEAR(doubted.trials.front().detection_limit, 5 / std::sqrt(position / 2) * 1e3,
+              0.05 * limit);
+}
+
+TEST(Screening, ADeclaredNumberIsToldWhereItLeavesItsToleranceForCertain) {
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, Machine(), 2);
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, Machine());
+  const SelectionResult result = select_effects_of(evidence, Machine(), toy::candidates(), {}, {});
+  // The force tells the mass far better than its tolerance of 1 %: a gain of 25 are 5 tolerances.
+  double mass = 0;
+  for (std::size_t i = 0; i < result.release_limits.size(); ++i)
+    if (result.base.nuisances.numbers[i].number.key == "axes.X.load_kg")
+      mass = result.release_limits[i];
+  EXPECT_NEAR(mass, 5 * 5, 0.1);
+}
+
+TEST(TrialValues, FrequenciesAreThoseTheReadingsRingWith) {
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, Machine(), 8);
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::deflection)
+      for (std::size_t k = 0; k < s.value.size(); ++k) {
+        const double t = 1e-3 * static_cast<double>(k % 500);  // begins anew twice a lap
+        s.value[k] += 200e-9 * std::exp(-t / 0.1) * std::sin(2 * kPi * 47 * t);
+      }
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, Machine());
+  const Candidate mode{"structural_mode",
+                       "X",
+                       {{"effects.X.structural_mode.participation", 1, -100, 100},
+                        {"effects.X.structural_mode.frequency_Hz", 35, 1, 500}},
+                       {1},
+                       Family::mechanics};
+  const TrialValuesOf values(evidence, evidence.residual(evidence.predict(Machine())));
+  const std::vector<double> tried = values(mode, 1);
+  EXPECT_TRUE(
+      std::any_of(tried.begin(), tried.end(), [](double f) { return std::abs(f - 47) < 1.5; }));
+}
+
+TEST(Evidence, APieceThatShiftsBetweenLapsIsNoNoise) {
+  Record still = toy::commands(1000, 4), shifting = still;
+  toy::measure(still, Machine(), 12);
+  toy::measure(shifting, Machine(), 12);
+  for (MeasuredSignal& s : shifting.signals)
+    if (s.kind == SignalKind::deflection)
+      for (std::size_t k = 0; k < s.value.size(); ++k)
+        s.value[k] += 2e-6 * std::sin(static_cast<double>(k) / 3000);
+  toy::ToyReplica of_still(still), of_shifting(shifting);
+  const double quiet = Evidence(still, of_still, Machine()).noise().channels[2].rms,
+               moved = Evidence(shifting, of_shifting, Machine()).noise().channels[2].rms;
+  EXPECT_NEAR(moved, quiet, 0.15 * quiet);
 }
 
 TEST(Trials, ALimitIsTriedWholeAtEveryValue) {
@@ -129,6 +236,27 @@ TEST(Trials, ALimitIsTriedWholeAtEveryValue) {
     // However much of it the residual holds: half a limit is no smaller effect.
     EXPECT_DOUBLE_EQ(start_of(clip, all[i], Eigen::VectorXd::Constant(1, 0.02))[0].value, value);
   }
+}
+
+TEST(Intervals, KnowThatALawIsKnownToOnePercentOnly) {
+  Record record = toy::commands(400, 4);
+  Machine truth;
+  move_number(truth, "effects.X.load_play.width_um", 5);
+  toy::measure(record, truth, 3);
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, Machine());
+  const Candidate play = toy::candidates()[4];
+  FittedMachine m = fit_declared(evidence, Machine());
+  m.added.push_back({.candidate = 4,
+                     .numbers = {{.number = play.numbers[0], .value = 5}},
+                     .gain = 0,
+                     .class_with = {}});
+  converge(evidence, m);
+  const std::string& key = play.numbers[0].key;
+  const double exact = intervals_of(evidence, m).at(key).half_width,
+               inexact = intervals_of(evidence, m, true).at(key).half_width;
+  EXPECT_LT(exact, 0.02);
+  EXPECT_NEAR(inexact, 1.96 * 0.01 * 5, 0.05);
 }
 
 TEST(Intervals, CoverTheTruthAsOftenAsTheySay) {

@@ -58,13 +58,22 @@ def in_class(effect, found):
                text.startswith(f"effects.{effect['place']}.{effect['name']}.") for text in found.get("class", []))
 
 
-def limit_of(report, effect):
+def limit_of(report, name):
     """Detection limit in the unit of the first number; None: the report says nothing of it."""
     for row in report.get("excitation", []):
-        if row["name"] == f"{effect['place']}.{effect['name']}":
+        if row["name"] in (name, f"{name}.deviation"):
             value = row.get("detection_limit")
-            return math.inf if value is None or not row.get("excited", True) else float(value)
+            return math.inf if value is None else float(value)
     return None
+
+
+def strength(effect, size, limit):
+    """Of its detection limit. A range is shown by any limit below the largest that is seen."""
+    if limit is None:
+        return math.nan
+    if effect["name"] == "range_clip":
+        return math.inf if 0 < size <= limit < math.inf else 0.0
+    return size / limit if limit else math.inf
 
 
 def first_number(effect):
@@ -95,9 +104,10 @@ def grade(answer, report, seconds):
         row["class"] = max((1 / (1 + len(told[0].get("class", []))) for e in effects
                             if same(e, told[0]) or in_class(e, told[0])), default=0.0) if told else 0.0
         row["exact"] = all(row["right"]) and len(told) == len(effects)
-        limits = [limit_of(report, e) for e in effects]
-        sizes = [first_number(e) for e in effects]
-        row["strength"] = math.nan if None in limits else min(s / l if l else math.inf for s, l in zip(sizes, limits))
+        sizes = answer.get("sizes") or [(f"{e['place']}.{e['name']}", first_number(e)) for e in effects]
+        limits = [limit_of(report, name) for name, _ in sizes]
+        strengths = [strength(e, size, l) for e, (_, size), l in zip(effects, sizes, limits)]
+        row["strength"] = math.nan if any(map(math.isnan, strengths)) else min(strengths)
         row["silent"] = not told and report["verdict"].startswith(SILENT)
         row["errors"], row["covered"] = [], []
         for e, l in zip(effects, limits):

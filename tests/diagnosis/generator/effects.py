@@ -6,7 +6,7 @@ that shows. `UNKNOWN` are effects that no entry of the library describes.
 
 import numpy as np
 
-from machine import AXES, TURN
+from machine import AXES, PIECE, TURN
 
 LINEAR, ROTARY, ALL = "XYZ", "AC", "XYZAC"
 ARCSEC = np.pi / 180 / 3600
@@ -171,8 +171,8 @@ def friction_asymmetry(m, axis, p):
     m.axis["asymmetry_dry"][axis] = p["dry_percent"] / 100
 
 
-@effect("XY", height_percent=30, centre_mm=lambda r, place: float(r.uniform(-25, 25)),
-        width_mm=fixed(20.0), edge_mm=fixed(6.0))
+@effect("XY", height_percent=30, centre_mm=lambda r, place: float(1e3 * PIECE[AXES.index(place)] + r.uniform(-12, 12)),
+        width_mm=fixed(12.0), edge_mm=fixed(4.0))
 def friction_zone(m, axis, p):
     c, w, e = p["centre_mm"] * 1e-3, p["width_mm"] * 1e-3, p["edge_mm"] * 1e-3
     h = p["height_percent"] / 100
@@ -457,7 +457,7 @@ def friction_by_other_axis(m, rng):
     f = rng.uniform(0.3, 0.8)
     # hooks see the axis' own state only, so the force is added as one of all axes
     level = m.axis["coulomb"][0]
-    m.load_force.append((0, lambda t, x, v: -f * level * np.tanh(v[0] / 2e-4) * x[1] / 0.04))
+    m.load_force.append((0, lambda t, x, v: -f * level * np.tanh(v[0] / 2e-4) * (x[1] - PIECE[1]) / 0.015))
     return {"law": "force on X as sgn(v_X) f(y)", "hook": "table_force", "axis": "X"}
 
 
@@ -465,23 +465,23 @@ def friction_by_other_axis(m, rng):
 def hose_between_axes(m, rng):
     """A hose from Y pulls on X: force on X in proportion to y."""
     k = rng.uniform(2, 5) * 1e3
-    m.load_force.append((0, lambda t, x, v: -k * x[1]))
+    m.load_force.append((0, lambda t, x, v: -k * (x[1] - PIECE[1])))
     return {"law": "force on X as f(y)", "hook": "table_force", "axis": "X"}
 
 
 @unknown
 def bellows_at_the_end(m, rng):
-    """A bellows that is pressed from x = 25 mm on: one-sided spring."""
+    """A bellows that is pressed over the last 10 mm of the ring: one-sided spring."""
     k = rng.uniform(8, 20) * 1e3
-    m.load_force.append((0, lambda t, x, v: -k * max(x[0] - 0.025, 0.0)))
+    m.load_force.append((0, lambda t, x, v: -k * max(x[0] - PIECE[0] - 0.005, 0.0)))
     return {"law": "force on X as f(x)", "hook": "table_force", "axis": "X"}
 
 
 @unknown
 def friction_far_out(m, rng):
-    """Dry friction of Y rises linearly beyond y = 8 mm."""
+    """Dry friction of Y rises linearly over the far half of the ring."""
     h = rng.uniform(0.4, 1.0)
-    m.friction_factor.append((1, lambda t, x, v: 1 + h * max(x - 0.008, 0.0) / 0.03))
+    m.friction_factor.append((1, lambda t, x, v: 1 + h * max(x - PIECE[1], 0.0) / 0.015))
     return {"law": "force on Y as sgn(v_Y) f(y)", "hook": "table_force", "axis": "Y"}
 
 
@@ -506,7 +506,7 @@ def waves_by_other_axis(m, rng):
     """X waves with 37 mm over the position of Y, more where x is large."""
     d = rng.uniform(1, 3) * 1e-6
     m.pose.append(lambda t, q, v, a: np.stack(
-        [d * np.sin(TURN * q[:, 1] / 37e-3) * (1 + q[:, 0] / 0.04), 0 * t, 0 * t], axis=1))
+        [d * np.sin(TURN * q[:, 1] / 37e-3) * (1 + (q[:, 0] - PIECE[0]) / 0.02), 0 * t, 0 * t], axis=1))
     return {"law": "displacement of X as f(y), g(x)", "hook": "displacement", "axis": "X"}
 
 

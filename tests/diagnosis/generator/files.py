@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 
-from machine import AXES, DECLARED, PIECE_HEIGHT, RING_RADIUS, SURFACE_FRICTION, TURN
+from machine import AXES, DECLARED, PIECE, RING_RADIUS, SURFACE_FRICTION, TURN
 
 DEGREE = np.pi / 180
 ROTARY = (False, False, False, True, True)
@@ -31,7 +31,7 @@ def machine_toml():
                 f"load_{kg} = {d['load'][i]}", f"motor_inertia_kgm2 = {d['motor_inertia'][i]}",
                 f"travel_per_turn_{unit} = {turn:.12g}", f"{f} = {d['force_limit'][i]}", ""]
     # The contact is quasi-static: a light suspension.
-    out += ["[probe]", "moving_mass_g = 1", "stylus_mass_g = 0.1", "", "[setup]", 'piece = "piece.toml"', f"g54_mm = [0, 0, {PIECE_HEIGHT * 1e3:g}]", ""]
+    out += ["[probe]", "moving_mass_g = 1", "stylus_mass_g = 0.1", "", "[setup]", 'piece = "piece.toml"', f"g54_mm = [{', '.join(f'{p * 1e3:g}' for p in PIECE)}]", ""]
     for i, axis in enumerate(AXES):
         e = f"[effects.{axis}."
         if d["compliance"][i]:

@@ -55,6 +55,27 @@ def true_values(found):
     return by_component(out)
 
 
+# Name -> key of a linear and of a rotary axis, and what it is called in machine.DECLARED.
+DECLARED_KEYS = {
+    "coulomb": (("effects.{}.coulomb.level_N", "effects.{}.coulomb.level_Nm"), "coulomb"),
+    "viscous": (("effects.{}.viscous.coefficient_Ns_per_m", "effects.{}.viscous.coefficient_Nms_per_rad"), "viscous"),
+    "load_mass": (("axes.{}.load_kg", "axes.{}.load_kgm2"), "load"),
+}
+
+
+def size_of(e):
+    """How large an effect is, under the name and in the unit of its detection limit."""
+    name, place, p = e["name"], e["place"], e["parameters"]
+    if name in DECLARED_KEYS:  # a share of what is declared
+        keys, declared = DECLARED_KEYS[name]
+        i = machine.AXES.index(place)
+        return [keys[files.ROTARY[i]].format(place), abs(p["share_percent"]) / 100 * machine.DECLARED[declared][i]]
+    if name == "surface_friction":
+        return ["probe.surface_friction", abs(p["coefficient"] - machine.SURFACE_FRICTION)]
+    value = next(iter(p.values()))
+    return [f"{place}.{name}", max(map(abs, value)) if isinstance(value, list) else abs(value)]
+
+
 def scenarios(rng, counts, individuals, names=None):
     """Single effects go through the library in a drawn order before any comes twice."""
     names = sorted(names or effects.EFFECTS)
@@ -70,6 +91,7 @@ def scenarios(rng, counts, individuals, names=None):
             elif kind in ("pair", "triple"):
                 s["effects"] = draw_effects(rng, {"pair": 2, "triple": 3}[kind], names)
             s["values"] = true_values(s["effects"])
+            s["sizes"] = [size_of(e) for e in s["effects"]]
             if kind == "unknown":
                 s["unknown"] = str(rng.choice(sorted(effects.UNKNOWN)))
             out.append(s)

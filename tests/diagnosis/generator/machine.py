@@ -34,7 +34,7 @@ DECLARED = {
 }
 SURFACE_FRICTION = 0.1
 RING_RADIUS = 17.5e-3
-PIECE_HEIGHT = 0.05
+PIECE = np.array([0.06, 0.04, 0.05])  # off the C axis: an error of its angle moves the ring
 
 # Standard deviations of the truth about the declaration, as shares.
 TOLERANCE = {"load": 0.01, "coulomb": 0.03, "viscous": 0.05, "stribeck": 0.05, "compliance": 0.02,
@@ -78,7 +78,7 @@ class Machine:
         self.displacement = []  # (axis, f(t, q, v, a, force)): along the axis
         self.pose = []  # f(t, q, v, a) -> (n, 3): of the tip in the machine
         self.geometry = kinematics.Geometry()
-        self.geometry.piece = np.array([0, 0, PIECE_HEIGHT])
+        self.geometry.piece = PIECE.copy()
         self.probe = probe_model.Probe()
         self.probe.friction = SURFACE_FRICTION
         self.piece = probe_model.Ring(RING_RADIUS)

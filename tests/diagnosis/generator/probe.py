@@ -12,15 +12,15 @@ import numpy as np
 
 
 class Ring:
-    """Bore about the z axis of the piece."""
+    """Bore about the z axis of the piece, half its height to either side; nothing beyond."""
 
-    def __init__(self, radius):
-        self.radius = radius
+    def __init__(self, radius, height=40e-3):
+        self.radius, self.height = radius, height
 
     def touch(self, p, ball):
         away = np.hypot(p[:, 0], p[:, 1])
         n = -np.stack([p[:, 0], p[:, 1], np.zeros(len(p))], axis=1) / np.maximum(away, 1e-9)[:, None]
-        return away - (self.radius - ball), n
+        return np.where(np.abs(p[:, 2]) < self.height / 2, away - (self.radius - ball), 0), n
 
 
 class Sphere:

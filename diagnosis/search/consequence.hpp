@@ -1,0 +1,19 @@
+// What a change of the machine does to what is measured, in units that matter to its user.
+#pragma once
+
+#include "diagnosis/search/evidence.hpp"
+
+namespace vcnc {
+
+struct Consequence {
+  /// RMS of what it does to the contour: to the reading of the probe where there is one, else to
+  /// the positions of the linear axes [um].
+  double contour_um = 0;
+  /// Largest RMS of what it does to any signal, and to any but the readings, of the noise of one
+  /// sample.
+  double of_noise = 0, of_noise_but_readings = 0;
+};
+
+Consequence consequence(const Evidence& evidence, const Prediction& a, const Prediction& b);
+
+}  // namespace vcnc

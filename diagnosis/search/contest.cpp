@@ -1,0 +1,312 @@
+#include "diagnosis/search/contest.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <numeric>
+
+#include "diagnosis/search/parallel.hpp"
+
+namespace vcnc {
+namespace {
+
+constexpr int kGlance = 4;        ///< iterations to see what a candidate is worth
+constexpr double kUsual = 1;      ///< decades about the typical size
+constexpr double kPromise = 0.3;  ///< of what is needed: worth a refit
+constexpr std::size_t kFinalists = 3, kRivals = 4, kMoreRefits = 8;
+
+void sort_by_worth(std::vector<Contender>& all) {
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Contender& x, const Contender& y) { return x.worth() > y.worth(); });
+}
+
+}  // namespace
+
+double ContestRules::excess(double held_out) const { return std::max(0.0, held_out - floor); }
+
+double ContestRules::threshold(double held_out) const {
+  const double left = excess(held_out);
+  return std::max({options.least_gain, options.least_share * left,
+                   options.share_of_form * std::min(left, options.form)});
+}
+
+Contest::Contest(const ContestRules& rules, const FittedMachine& now)
+    : rules_(rules),
+      now_(now),
+      linear_(now.linear()),
+      ground_(rules.evidence, now.residual, linear_),
+      doubt_(doubt_of(rules.options, now.added.empty() ? std::vector<double>{} : rules.base_of,
+                      ground_.held_out_of)) {}
+
+std::vector<Contender> Contest::contenders() {
+  const std::vector<Screened> all_screened = screened(), list = shortlist(all_screened);
+  std::vector<Contender> all = refitted(list);
+  finish(all);
+  if (const std::vector<Screened> more = likes_of(all, all_screened, list); !more.empty()) {
+    std::vector<Contender> others = refitted(more);
+    std::move(others.begin(), others.end(), std::back_inserter(all));
+    finish(all);
+  }
+  for (Contender& c : releases()) all.push_back(std::move(c));
+  const double needed = rules_.threshold(ground_.held_out);
+  std::erase_if(all, [&](const Contender& c) {
+    const double least = c.released.empty() ? needed : rules_.options.release_gain;
+    return c.gain <= least || counted_gain(c) <= least ||
+           (c.released.empty() && !under_two_conditions(c));
+  });
+  sort_by_worth(all);
+  put_simplest_first(all);
+  if (all.empty() || all.front().gain < 0.5 * rules_.excess(ground_.held_out))
+    look_ahead(all_screened, all);
+  return all;
+}
+
+std::vector<Contender> Contest::rivals(double least, std::size_t but) const {
+  std::vector<Screened> list = screened();
+  std::erase_if(list, [&](const Screened& s) { return s.gain < least || candidate_of(s) == but; });
+  if (list.size() > kRivals) list.resize(kRivals);
+  std::vector<Contender> all = refitted(list);
+  sort_by_worth(all);
+  return all;
+}
+
+std::vector<std::size_t> Contest::equivalents(const std::vector<Contender>& contenders) const {
+  std::vector<std::size_t> all;
+  const auto most =
+      std::max_element(contenders.begin(), contenders.end(),
+                       [](const Contender& x, const Contender& y) { return x.gain < y.gain; });
+  const double band = band_of(most->gain);
+  for (std::size_t i = 1; i < contenders.size(); ++i)
+    if (contenders[i].released.empty() && contenders[i].gain > most->gain - band &&
+        contenders[i].gain > 0.5 * most->gain)
+      all.push_back(contenders[i].candidate);
+  return all;
+}
+
+std::size_t Contest::candidate_of(const Screened& s) const {
+  return rules_.trials[s.trial].trial.candidate;
+}
+
+/// All but what is found already, best first.
+std::vector<Screened> Contest::screened() const {
+  std::vector<Screened> all =
+      screen(rules_.evidence, ground_, doubt_, rules_.candidates, rules_.trials);
+  std::erase_if(all, [&](const Screened& s) {
+    return std::any_of(now_.added.begin(), now_.added.end(),
+                       [&](const AddedEffect& a) { return a.candidate == candidate_of(s); });
+  });
+  return all;
+}
+
+/// Screened candidates worth a refit.
+std::vector<Screened> Contest::shortlist(const std::vector<Screened>& screened) const {
+  std::vector<Screened> list;
+  std::map<Family, std::size_t> of_family;
+  for (const Screened& s : screened) {
+    if (s.counted < kPromise * rules_.options.least_gain) continue;
+    const Family family = rules_.candidates[candidate_of(s)].family;
+    const bool first = list.size() < rules_.options.refits;
+    if (!first && (of_family[family] >= rules_.options.per_family || s.gain < 0.1 * list[0].gain))
+      continue;
+    ++of_family[family];
+    list.push_back(s);
+  }
+  return list;
+}
+
+std::vector<Contender> Contest::refitted(const std::vector<Screened>& list) const {
+  std::vector<Contender> all(list.size());
+  std::atomic<std::size_t> done = 0;
+  rules_.evidence.each_together(list.size(), [&](std::size_t i) {
+    if (!rules_.go("refitting " + std::to_string(list.size()) + " candidates",
+                   static_cast<double>(done) / static_cast<double>(list.size())))
+      return;
+    all[i] = contender({list[i].trial}, list[i].size, list[i].gain);
+    ++done;
+  });
+  return all;
+}
+
+/// Gains that differ by less are alike when the best is `gain`.
+double Contest::band_of(double gain) const {
+  return rules_.options.class_gain +
+         rules_.options.class_share * rules_.excess(ground_.held_out - gain) +
+         rules_.options.class_doubt * std::accumulate(doubt_.begin(), doubt_.end(), 0.0);
+}
+
+/// What was left out of a list though its promise is like the best gain.
+std::vector<Screened> Contest::likes_of(const std::vector<Contender>& all,
+                                        const std::vector<Screened>& screened,
+                                        const std::vector<Screened>& list) const {
+  std::vector<Screened> more;
+  if (all.empty()) return more;
+  const double best = all.front().gain;
+  if (best < rules_.threshold(ground_.held_out)) return more;
+  for (const Screened& s : screened) {
+    if (more.size() == kMoreRefits || s.gain < best - 2 * band_of(best)) break;
+    if (std::none_of(list.begin(), list.end(),
+                     [&](const Screened& l) { return l.trial == s.trial; }))
+      more.push_back(s);
+  }
+  return more;
+}
+
+/// Of those that do as well as the first, the one with the fewest numbers, of a size nearest to
+/// the typical one.
+void Contest::put_simplest_first(std::vector<Contender>& all) const {
+  if (all.empty() || !all.front().released.empty()) return;
+  const double most = all.front().gain, band = band_of(most);
+  // A gain that is less by the band weighs like one number more.
+  const auto cost = [&](const Contender& c) { return intricacy(c) + (most - c.gain) / band; };
+  auto simplest = all.begin();
+  for (auto c = all.begin(); c != all.end(); ++c)
+    if (c->released.empty() && c->gain > most - band && cost(*c) < cost(*simplest)) simplest = c;
+  std::rotate(all.begin(), simplest, simplest + 1);
+}
+
+/// Numbers, and two for every further tenth or tenfold of a usual size.
+double Contest::intricacy(const Contender& c) const {
+  double largest = 0;
+  for (const FreedNumber& n : c.numbers)
+    for (const FreeNumber& own : rules_.candidates[c.candidate].numbers)
+      if (own.key == n.number.key && !n.shape && !is_phase(own) && own.typical != 0)
+        largest = std::max(largest, std::abs(n.value / own.typical));
+  const double unusual = largest > 0 ? std::max(0.0, std::abs(std::log10(largest)) - kUsual) : 0;
+  return static_cast<double>(c.numbers.size()) + 2 * unusual;
+}
+
+Contender Contest::contender(const std::vector<std::size_t>& trials, const Eigen::VectorXd& size,
+                             double promised) const {
+  Contender best;
+  // From where the sensitivities point to, and from a third of the way: some effects are not
+  // linear and disappoint.
+  for (const double share : {1.0, 0.3}) {
+    Contender c;
+    Eigen::Index at = 0;
+    for (const std::size_t t : trials) {
+      const Trial& trial = rules_.trials[t].trial;
+      const auto width = static_cast<Eigen::Index>(trial.directions.size());
+      const std::vector<FreedNumber> numbers =
+          start_of(rules_.candidates[trial.candidate], trial,
+                   Eigen::VectorXd(share * size.segment(at, width)));
+      c.numbers.insert(c.numbers.end(), numbers.begin(), numbers.end());
+      at += width;
+    }
+    c.candidate = rules_.trials[trials.front()].trial.candidate;
+    c.fit = refit(rules_.evidence, now_.machine, c.numbers, without(linear_, c.numbers), kGlance);
+    c.numbers = c.fit.live;
+    c.gain = ground_.held_out - c.fit.held_out;
+    const bool first = share == 1.0;
+    if (first || c.gain > best.gain) best = std::move(c);
+    if (best.gain > 0.5 * promised) break;
+  }
+  return best;
+}
+
+/// Converges those contenders that may yet be the best.
+void Contest::finish(std::vector<Contender>& all) const {
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Contender& x, const Contender& y) { return x.gain > y.gain; });
+  const double best = all.empty() ? 0 : all.front().gain;
+  std::size_t finalists = 0;
+  while (finalists < all.size() && all[finalists].gain >= 0.5 * best &&
+         (finalists < kFinalists || all[finalists].gain >= best - rules_.options.class_gain))
+    ++finalists;
+  rules_.evidence.each_together(finalists, [&](std::size_t i) {
+    Contender& c = all[i];
+    if (c.converged || !rules_.go("refitting the best", 0)) return;
+    c.converged = true;
+    c.fit = refit(rules_.evidence, now_.machine, c.numbers, without(linear_, c.numbers));
+    c.numbers = c.fit.live;
+    c.gain = ground_.held_out - c.fit.held_out;
+  });
+}
+
+/// A declared number whose tolerance is lifted competes with the effects.
+std::vector<Contender> Contest::releases() const {
+  std::vector<Contender> all;
+  for (std::size_t i = 0; i < now_.nuisances.numbers.size(); ++i) {
+    const FreedNumber& n = now_.nuisances.numbers[i];
+    if (std::abs(n.pull()) < rules_.options.out_of_tolerance ||
+        n.number.key.starts_with("effects.setup."))
+      continue;
+    Eigen::VectorXd precision = ground_.precision;
+    precision[static_cast<Eigen::Index>(i)] = 0;
+    const LinearStep s =
+        linear_step(ground_.grams.fitted, ground_.grams.held_out, precision, linear_.offset());
+    const double value = n.value + s.step[static_cast<Eigen::Index>(i)] * n.number.typical;
+    if (value < n.number.min || value > n.number.max) continue;
+    Contender c;
+    c.released = n.number.key;
+    c.numbers = {n};
+    c.gain = ground_.held_out - s.held_out;
+    c.fit.held_out_of = left_after(ground_.grams.held_out_of, s.step);
+    all.push_back(std::move(c));
+  }
+  return all;
+}
+
+double Contest::counted_gain(const Contender& c) const {
+  return counted(c.gain, ground_.held_out_of, c.fit.held_out_of, doubt_);
+}
+
+/// Held-out gain per condition: an effect that shows under several must help under two.
+bool Contest::under_two_conditions(const Contender& c) const {
+  const Evidence& evidence = rules_.evidence;
+  if (evidence.partition().conditions() < 2) return true;
+  const LinearPart others = without(linear_, c.numbers);
+  std::vector<const Column*> before{&now_.residual}, after{&c.fit.residual};
+  for (const Column& n : others.columns) {
+    before.push_back(&n);
+    after.push_back(&n);
+  }
+  const BlockGrams g0 = evidence.grams(before), g1 = evidence.grams(after);
+  const Eigen::VectorXd step0 =
+      linear_step(evidence.sum(g0, Role::fitted), evidence.sum(g0, Role::held_out),
+                  others.precision(), others.offset())
+          .step;
+  std::map<int, double> gains;
+  for (std::size_t b = 0; b < g0.size(); ++b) {
+    const Block& block = evidence.partition().blocks[b];
+    if (block.held_out)
+      gains[block.condition] += left_after(g0[b], step0) - left_after(g1[b], c.fit.linear_step);
+  }
+  double sum = 0, largest = 0;
+  int helped = 0;
+  for (const auto& [condition, gain] : gains) {
+    sum += std::abs(gain);
+    largest = std::max(largest, gain);
+    helped += gain > 2;
+  }
+  // It may show under one condition only; then it must do no harm under the others.
+  return helped >= 2 ||
+         (helped == 1 && largest > 0.99 * sum && largest > 4 * rules_.options.least_gain);
+}
+
+/// The best pair of screened candidates, where it does far better than any one.
+void Contest::look_ahead(const std::vector<Screened>& screened, std::vector<Contender>& all) const {
+  const std::size_t n = std::min(rules_.options.pairs_of, screened.size());
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = i + 1; j < n; ++j) pairs.emplace_back(i, j);
+  std::vector<Screened> together(pairs.size());
+  parallel_for(pairs.size(), [&](std::size_t p) {
+    together[p] = screen_pair(rules_.evidence, ground_, doubt_, rules_.trials,
+                              screened[pairs[p].first].trial, screened[pairs[p].second].trial);
+  });
+  if (pairs.empty() || !rules_.go("looking at pairs", 0)) return;
+  const auto best =
+      std::max_element(together.begin(), together.end(),
+                       [](const Screened& x, const Screened& y) { return x.counted < y.counted; });
+  const double single = all.empty() ? 0 : all.front().gain;
+  const double least =
+      std::max(rules_.threshold(ground_.held_out), 0.1 * rules_.excess(ground_.held_out));
+  if (best->counted < single + least) return;
+  const std::size_t other = pairs[static_cast<std::size_t>(best - together.begin())].second;
+  Contender c = contender({best->trial, screened[other].trial}, best->size, best->gain);
+  if (counted_gain(c) > single + least) all.insert(all.begin(), std::move(c));
+}
+
+}  // namespace vcnc

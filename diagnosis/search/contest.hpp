@@ -1,0 +1,88 @@
+// Candidates against each other: which of them explains best what a fitted machine leaves?
+//
+// Screened ones (screening.hpp) that gain enough are refitted nonlinearly, a few iterations each;
+// those that may yet be the best are converged. A declared number whose tolerance is lifted
+// competes with them, and so do pairs where no single one explains half. See selection.hpp for what
+// is asked of a gain.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "diagnosis/search/candidate.hpp"
+#include "diagnosis/search/diagnosis_options.hpp"
+#include "diagnosis/search/fitted_machine.hpp"
+#include "diagnosis/search/screening.hpp"
+
+namespace vcnc {
+
+/// What a candidate came to.
+struct Contender {
+  std::size_t candidate = 0;
+  std::vector<FreedNumber> numbers;
+  Refit fit;
+  double gain = 0;
+  std::string released;  ///< key of a declared number whose tolerance is lifted; else empty
+  bool converged = false;
+
+  /// Gain less what further numbers give by chance.
+  double worth() const { return gain - 4 * static_cast<double>(numbers.size()); }
+};
+
+/// What every contest of a diagnosis has in common.
+struct ContestRules {
+  const Evidence& evidence;
+  const std::vector<Candidate>& candidates;
+  const DiagnosisOptions& options;
+  std::vector<TrialColumns>& trials;
+  std::vector<double> base_of;  ///< held-out chi-square per channel before anything was found
+  double floor = 0;             ///< what noise leaves of held-out chi-square
+  /// Told what is done and how far it is; false stops the work.
+  std::function<bool(const std::string&, double)> go;
+
+  double excess(double held_out) const;
+  /// What a candidate must gain where so much is left.
+  double threshold(double held_out) const;
+};
+
+class Contest {
+ public:
+  Contest(const ContestRules& rules, const FittedMachine& now);
+
+  /// Those that gain enough, best first.
+  std::vector<Contender> contenders();
+  /// Candidates that do as well as the first of the contenders.
+  std::vector<std::size_t> equivalents(const std::vector<Contender>& contenders) const;
+  /// The candidates but one that may gain `least`, refitted, best first.
+  std::vector<Contender> rivals(double least, std::size_t but) const;
+
+  double held_out() const { return ground_.held_out; }
+
+ private:
+  std::vector<Screened> screened() const;
+  std::vector<Screened> shortlist(const std::vector<Screened>& screened) const;
+  std::vector<Screened> likes_of(const std::vector<Contender>& all,
+                                 const std::vector<Screened>& screened,
+                                 const std::vector<Screened>& list) const;
+  std::vector<Contender> refitted(const std::vector<Screened>& list) const;
+  Contender contender(const std::vector<std::size_t>& trials, const Eigen::VectorXd& size,
+                      double promised) const;
+  void finish(std::vector<Contender>& all) const;
+  std::vector<Contender> releases() const;
+  void look_ahead(const std::vector<Screened>& screened, std::vector<Contender>& all) const;
+  void put_simplest_first(std::vector<Contender>& all) const;
+  double intricacy(const Contender& contender) const;
+  double counted_gain(const Contender& contender) const;
+  bool under_two_conditions(const Contender& contender) const;
+  double band_of(double gain) const;
+  std::size_t candidate_of(const Screened& s) const;
+
+  const ContestRules& rules_;
+  const FittedMachine& now_;
+  LinearPart linear_;
+  Ground ground_;
+  Doubt doubt_;
+};
+
+}  // namespace vcnc

@@ -1,0 +1,26 @@
+// How much of a gain cannot be an error of the models' form.
+//
+// A model that gets the healthy machine wrong by some chi-square in a channel, or what it has
+// explained there, may gain a part of that by an effect that is not there. So of a gain in a
+// channel only that counts which exceeds such a part.
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/search/diagnosis_options.hpp"
+
+namespace vcnc {
+
+/// Chi-square of the held-out laps per channel that does not count; empty: all counts.
+using Doubt = std::vector<double>;
+
+/// Where `left` is what is left now and `before` was there before anything was explained; nothing
+/// was explained yet where that is empty.
+Doubt doubt_of(const DiagnosisOptions& options, const std::vector<double>& before,
+               const std::vector<double>& left);
+
+/// Of `gain`, which came from `before` going down to `after` in the channels.
+double counted(double gain, const std::vector<double>& before, const std::vector<double>& after,
+               const Doubt& doubt);
+
+}  // namespace vcnc

@@ -1,0 +1,155 @@
+#include "diagnosis/search/fitted_machine.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/search/screening.hpp"
+
+namespace vcnc {
+namespace {
+
+/// Takes over what a refit found and computes everything at it.
+void settle(const Evidence& evidence, FittedMachine& m, const Refit& f) {
+  m.machine = f.machine;
+  for (AddedEffect& a : m.added) adopt(a.numbers, f.live);
+  adopt(m.nuisances.numbers, f.linear);
+  adopt(m.nuisances.numbers, f.live);
+  m.prediction = evidence.predict(m.machine);
+  m.residual = evidence.residual(m.prediction);
+  m.columns = f.columns;
+  const Ground ground(evidence, m.residual, m.linear());
+  m.held_out = ground.held_out;
+}
+
+/// Chi-square of the fitted laps with what the numbers are off their declaration.
+double misfit(const Evidence& evidence, const Column& residual,
+              const std::vector<FreedNumber>& numbers) {
+  double sum = evidence.chi2(residual, Role::fitted);
+  for (const FreedNumber& n : numbers) sum += n.pull() * n.pull();
+  return sum;
+}
+
+/// Declared numbers are not believed to be off by more than this many tolerances, wherever the
+/// sensitivities point to; further ones are released or compete as effects.
+constexpr double kFarthestPull = 20;
+
+/// Part of the way from `from` to `to`.
+std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vector<FreedNumber> to,
+                                 double share) {
+  for (FreedNumber& n : to) {
+    for (const FreedNumber& f : from)
+      if (f.number.key == n.number.key) n.value = f.value + share * (n.value - f.value);
+    if (n.tolerance > 0) {
+      const double reach = kFarthestPull * n.tolerance;
+      n.value = std::clamp(n.value, n.centre - reach, n.centre + reach);
+    }
+    n.value = std::clamp(n.value, std::min(n.number.min, n.number.max),
+                         std::max(n.number.min, n.number.max));
+  }
+  return to;
+}
+
+/// Goes as far towards a refit as makes the misfit smaller: sensitivities are not everywhere what
+/// they are where they were taken. False: not a step.
+bool step_towards(const Evidence& evidence, FittedMachine& m, const Refit& f, double& least) {
+  std::vector<FreedNumber> old = m.nuisances.numbers;
+  for (const FreedNumber& n : m.numbers()) old.push_back(n);
+  for (const double share : {1.0, 0.5, 0.2, 0.05}) {
+    Refit part = f;
+    part.linear = between(old, f.linear, share);
+    part.live = between(old, f.live, share);
+    part.machine = with(with(m.machine, part.live), part.linear);
+    FittedMachine trial = m;
+    settle(evidence, trial, part);
+    const double now = misfit(evidence, trial.residual, trial.nuisances.numbers);
+    if (!(now < least)) continue;
+    least = now;
+    m = std::move(trial);
+    return true;
+  }
+  return false;
+}
+
+/// Computes everything where the machine stands.
+void stay(const Evidence& evidence, FittedMachine& m) {
+  m.prediction = evidence.predict(m.machine);
+  m.residual = evidence.residual(m.prediction);
+  m.columns = columns_of(evidence, m.machine, m.prediction, m.numbers());
+  m.held_out = Ground(evidence, m.residual, m.linear()).held_out;
+}
+
+void linearise_nuisances(const Evidence& evidence, FittedMachine& m) {
+  m.nuisances.columns = columns_of(evidence, m.machine, m.prediction, m.nuisances.numbers);
+}
+
+constexpr int kLinearisations = 3;  ///< at most, of the declared machine
+constexpr double kSettled = 5;      ///< chi-square that no further one is worth
+
+}  // namespace
+
+std::vector<FreedNumber> FittedMachine::numbers() const {
+  std::vector<FreedNumber> all;
+  for (const AddedEffect& a : added) all.insert(all.end(), a.numbers.begin(), a.numbers.end());
+  return all;
+}
+
+LinearPart FittedMachine::linear() const {
+  LinearPart all = nuisances;
+  const std::vector<FreedNumber> more = numbers();
+  for (std::size_t i = 0; i < more.size() && i < columns.size(); ++i) {
+    all.numbers.push_back(more[i]);
+    all.columns.push_back(columns[i]);
+  }
+  return all;
+}
+
+void converge(const Evidence& evidence, FittedMachine& m) {
+  constexpr int kRounds = 3;
+  double before = m.held_out;
+  double least =
+      misfit(evidence, evidence.residual(evidence.predict(m.machine)), m.nuisances.numbers);
+  for (int round = 0; round < kRounds; ++round) {
+    const std::vector<FreedNumber> live = m.numbers();
+    const Refit f = refit(evidence, m.machine, live, without(m.nuisances, live), 8);
+    if (!step_towards(evidence, m, f, least)) {
+      if (round == 0) stay(evidence, m);
+      break;
+    }
+    const double now = m.held_out;
+    if (std::abs(before - now) < 1 + 1e-4 * std::abs(now - evidence.count(Role::held_out))) break;
+    before = now;
+  }
+}
+
+FittedMachine fit_declared(Evidence& evidence, const Machine& declared) {
+  return fit_numbers(evidence, declared, nuisances(declared));
+}
+
+FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
+                          std::vector<FreedNumber> numbers) {
+  FittedMachine m;
+  m.machine = declared;
+  m.nuisances.numbers = std::move(numbers);
+  m.prediction = evidence.predict(declared);
+  linearise_nuisances(evidence, m);
+  // What the run cannot show stays at its declaration.
+  LinearPart shown;
+  for (std::size_t i = 0; i < m.nuisances.numbers.size(); ++i) {
+    if (m.nuisances.columns[i].zero()) continue;
+    shown.numbers.push_back(m.nuisances.numbers[i]);
+    shown.columns.push_back(std::move(m.nuisances.columns[i]));
+  }
+  m.nuisances = std::move(shown);
+  converge(evidence, m);
+  evidence.anchor(m.machine);
+  converge(evidence, m);
+  for (int round = 0; round < kLinearisations; ++round) {
+    const double before = m.held_out;
+    linearise_nuisances(evidence, m);
+    converge(evidence, m);
+    if (before - m.held_out < kSettled) break;
+  }
+  return m;
+}
+
+}  // namespace vcnc

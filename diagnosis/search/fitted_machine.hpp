@@ -1,0 +1,46 @@
+// A machine by hypothesis with everything that was computed at it, and fitting one.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "diagnosis/search/evidence.hpp"
+#include "diagnosis/search/refit.hpp"
+
+namespace vcnc {
+
+/// An effect that was accepted.
+struct AddedEffect {
+  std::size_t candidate = 0;  ///< index into the candidates
+  std::vector<FreedNumber> numbers;
+  double gain = 0;
+  std::vector<std::size_t> class_with;  ///< candidates that do as well
+};
+
+/// A machine by hypothesis with all that was computed at it.
+struct FittedMachine {
+  Machine machine;
+  std::vector<AddedEffect> added;
+  LinearPart nuisances;               ///< those of released declared numbers have no tolerance
+  std::vector<std::string> released;  ///< declared numbers found out of tolerance
+  Prediction prediction;
+  Column residual;
+  std::vector<Column> columns;  ///< of all numbers of `added`, in order
+  double held_out = std::numeric_limits<double>::infinity();
+
+  std::vector<FreedNumber> numbers() const;  ///< of all added effects
+  /// Nuisances and added effects with their columns.
+  LinearPart linear() const;
+};
+
+/// Fits all numbers of a machine together, nuisances included, until nothing moves.
+void converge(const Evidence& evidence, FittedMachine& machine);
+
+/// The declared machine with its nuisances fitted, or with these numbers.
+FittedMachine fit_declared(Evidence& evidence, const Machine& declared);
+FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
+                          std::vector<FreedNumber> numbers);
+
+}  // namespace vcnc

@@ -1,0 +1,56 @@
+#include "diagnosis/search/role_grams.hpp"
+
+namespace vcnc {
+namespace {
+
+Eigen::MatrixXd bordered(const Eigen::MatrixXd& a, const Eigen::MatrixXd& across,
+                         const Eigen::MatrixXd& b) {
+  if (b.size() == 0) return a;
+  Eigen::MatrixXd all(a.rows() + b.rows(), a.cols() + b.cols());
+  all << a, across, across.transpose(), b;
+  return all;
+}
+
+Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  Eigen::MatrixXd both(a.rows(), a.cols() + b.cols());
+  both << a, b;
+  return both;
+}
+
+}  // namespace
+
+RoleGrams RoleGrams::none(Eigen::Index rows, Eigen::Index cols, std::size_t channels) {
+  const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(rows, cols);
+  return {zero, zero, std::vector<Eigen::MatrixXd>(channels, zero)};
+}
+
+RoleGrams bordered(const RoleGrams& a, const RoleGrams& across, const RoleGrams& b) {
+  if (b.fitted.size() == 0) return a;
+  RoleGrams all{bordered(a.fitted, across.fitted, b.fitted),
+                bordered(a.held_out, across.held_out, b.held_out),
+                {}};
+  for (std::size_t c = 0; c < a.held_out_of.size(); ++c)
+    all.held_out_of.push_back(bordered(a.held_out_of[c], across.held_out_of[c], b.held_out_of[c]));
+  return all;
+}
+
+RoleGrams beside(const RoleGrams& a, const RoleGrams& b) {
+  RoleGrams both{beside(a.fitted, b.fitted), beside(a.held_out, b.held_out), {}};
+  for (std::size_t c = 0; c < a.held_out_of.size(); ++c)
+    both.held_out_of.push_back(beside(a.held_out_of[c], b.held_out_of[c]));
+  return both;
+}
+
+double left_after(const Eigen::MatrixXd& g, const Eigen::VectorXd& step) {
+  const Eigen::Index n = step.size();
+  return g(0, 0) - 2 * step.dot(g.block(1, 0, n, 1).col(0)) + step.dot(g.block(1, 1, n, n) * step);
+}
+
+std::vector<double> left_after(const std::vector<Eigen::MatrixXd>& products,
+                               const Eigen::VectorXd& step) {
+  std::vector<double> left;
+  for (const Eigen::MatrixXd& g : products) left.push_back(left_after(g, step));
+  return left;
+}
+
+}  // namespace vcnc

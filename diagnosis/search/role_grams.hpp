@@ -1,0 +1,32 @@
+// Products of columns with each other, summed over what is fitted and what is held out.
+//
+// With G the products of [z, c_1 ... c_n], a step s along the columns leaves
+//
+//   |z - C s|^2 = G_00 - 2 s' G_c0 + s' G_cc s
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+namespace vcnc {
+
+struct RoleGrams {
+  Eigen::MatrixXd fitted, held_out;
+  std::vector<Eigen::MatrixXd> held_out_of;  ///< per channel; they add up to held_out
+
+  /// All zero.
+  static RoleGrams none(Eigen::Index rows, Eigen::Index cols, std::size_t channels);
+};
+
+/// Products of [a, b] with themselves, from those of a, of a with b, and of b.
+RoleGrams bordered(const RoleGrams& a, const RoleGrams& across, const RoleGrams& b);
+/// Products of some columns with [a, b].
+RoleGrams beside(const RoleGrams& a, const RoleGrams& b);
+
+/// Chi-square that a step leaves, from the products of [z, columns].
+double left_after(const Eigen::MatrixXd& products, const Eigen::VectorXd& step);
+/// The same for every channel.
+std::vector<double> left_after(const std::vector<Eigen::MatrixXd>& products,
+                               const Eigen::VectorXd& step);
+
+}  // namespace vcnc
