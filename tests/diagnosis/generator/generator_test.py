@@ -126,7 +126,7 @@ class Kinematics(unittest.TestCase):
             return {"x": np.array([[1, 0, 0], [0, c, -s], [0, s, c]]),
                     "z": np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])}[axis]
 
-        ideal, _ = kinematics.tip_in_piece(kinematics.Geometry(), axes)
+        ideal, _ = kinematics.tip_in_piece(machine.Machine().geometry, axes)
         for name, place, parameters, error in (
                 ("c_axis_offset", "geometry", {"x_um": 8.0, "y_um": -5.0},
                  lambda q: (np.eye(3) - matrix("z", q[4])) @ [8e-6, -5e-6, 0]),
@@ -188,8 +188,8 @@ class Recording(unittest.TestCase):
         t = np.arange(1300) * 1e-3
         commands = np.zeros((len(t), 5))
         ease = np.minimum(t / 0.3, 1) ** 2
-        commands[:, 0] = 0.03 * np.sin(4 * t) * ease
-        commands[:, 1] = 0.03 * np.sin(3 * t + 0.4) * ease
+        commands[:, 0] = machine.PIECE[0] + 0.03 * np.sin(4 * t) * ease
+        commands[:, 1] = machine.PIECE[1] + 0.03 * np.sin(3 * t + 0.4) * ease
         commands[:, 2] = 0.2 + 0.004 * np.sin(3 * t) * ease
         commands[:, 3] = 0.1 * np.sin(2.5 * t) * ease
         commands[:, 4] = 0.6 * np.sin(2 * t) * ease
