@@ -409,14 +409,13 @@ class Report {
       LawFit instead = best_law(evidence_, selection_.base, doubt_of(options_, {}, base), options_);
       const double named = selection_.base.held_out - found().held_out;
       const double clearly = needed + options_.share_of_found * named;
-      if (instead.gain > (found().added.size() > 1 ? named - clearly : named + clearly) &&
+      if (instead.gain > (found().added.size() > 1 ? named : named + clearly) &&
           instead.gain > 0.5 * (named + std::max(0.0, law.gain))) {
         std::string names;
         for (const AddedEffect& a : found().added)
           names += (names.empty() ? "" : " with ") + of_.candidates[a.candidate].name();
-        d_.notes.push_back(fmt::format("It looks like {}, but {} alone {}.", names,
-                                       words_of(instead.law.law),
-                                       instead.gain > named ? "fits better" : "fits as well"));
+        d_.notes.push_back(fmt::format("It looks like {}, but {} alone fits better.", names,
+                                       words_of(instead.law.law)));
         std::erase_if(d_.effects, [](const FoundEffect& e) {
           return !e.place.empty() && e.place != "setup" && e.name != "deviation";
         });

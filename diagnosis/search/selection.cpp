@@ -12,7 +12,8 @@
 namespace vcnc {
 namespace {
 
-constexpr double kClearLoss = 4;   ///< times the least gain: no need to look closer
+constexpr double kClearLoss = 4;  ///< times the least gain: no need to look closer
+constexpr std::size_t kAttempts = 3;
 constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
 
 class Search {
@@ -35,21 +36,7 @@ class Search {
     simulate();
     while (now.added.size() + now.released.size() < options_.max_effects && going_) {
       Contest contest(rules_, now);
-      const std::vector<Contender> contenders = contest.contenders();
-      if (contenders.empty()) break;
-      const double before = now.held_out, needed = contenders.front().released.empty()
-                                                       ? rules_.threshold(before)
-                                                       : options_.release_gain;
-      FittedMachine trial = now;
-      add(trial, contenders.front(), contest.equivalents(contenders));
-      if (!(before - trial.held_out > needed)) {
-        evidence_.anchor(now.machine);
-        break;
-      }
-      now = std::move(trial);
-      drop(now);
-      hold_again(now);
-      if (!(before - now.held_out > needed)) break;  // it was dropped again
+      if (!accept_one(now, contest.contenders(), contest)) break;
       exchange(now);
       tell_rung(now);
     }
@@ -62,6 +49,26 @@ class Search {
     const std::lock_guard lock(guard_);
     if (going_ && keep_going_ && !keep_going_({doing, share})) going_ = false;
     return going_;
+  }
+
+  /// Adds the best contender that is still worth it when everything has been fitted together.
+  bool accept_one(FittedMachine& now, const std::vector<Contender>& contenders,
+                  const Contest& contest) {
+    for (std::size_t i = 0; i < std::min(kAttempts, contenders.size()) && going_; ++i) {
+      const double needed =
+          contenders[i].released.empty() ? rules_.threshold(now.held_out) : options_.release_gain;
+      FittedMachine trial = now;
+      add(trial, contenders[i],
+          i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
+      drop(trial);
+      hold_again(trial);
+      if (now.held_out - trial.held_out > needed) {
+        now = std::move(trial);
+        return true;
+      }
+      evidence_.anchor(now.machine);
+    }
+    return false;
   }
 
   /// What the first effect must reach.
