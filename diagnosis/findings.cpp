@@ -20,6 +20,8 @@ namespace {
 
 /// Of the noise of a sample: two machines that differ by less are the same.
 constexpr double kSameMachine = 1e-3;
+/// Of the noise's chi-square: a form that leaves less in every channel makes no model inexact.
+constexpr double kExactForm = 0.01;
 constexpr double kQuiet = 1.05, kAllExplained = 0.98;
 /// Part of the noise's chi-square that no law is sought in.
 constexpr double kFloorScatter = 0.04;
@@ -100,6 +102,7 @@ class Report {
 
   Diagnosis write() {
     put_back_unneeded();
+    put_back_undetermined();
     prefer_positive();
     tell_slip();
     tell_effects();
@@ -123,7 +126,10 @@ class Report {
 
   /// Whether the model is known to be more than noise off the machine.
   bool inexact() const {
-    return !options_.form_of_channel.empty() || found().held_out > options_.model_form * floor_;
+    const std::vector<double>& form = options_.form_of_channel;
+    for (std::size_t c = 0; c < form.size(); ++c)
+      if (form[c] > kExactForm * evidence_.count(c, Role::held_out)) return true;
+    return found().held_out > options_.model_form * floor_;
   }
 
   /// A flexible effect has numbers that the record can do without: they go back to the declaration,
@@ -131,12 +137,7 @@ class Report {
   void put_back_unneeded() {
     FittedMachine& m = selection_.found;
     for (AddedEffect& a : m.added) {
-      const Candidate& candidate = of_.candidates[a.candidate];
-      const auto is_amplitude = [&](const FreedNumber& n) {
-        return std::none_of(candidate.shape.begin(), candidate.shape.end(), [&](std::size_t s) {
-          return candidate.numbers[s].key == n.number.key;
-        });
-      };
+      const auto is_amplitude = [&](const FreedNumber& n) { return !is_shape(a, n); };
       while (std::count_if(a.numbers.begin(), a.numbers.end(), is_amplitude) > 1) {
         const double chi2 = evidence_.chi2(m.residual, Role::both);
         double least = std::max(kUnneeded, kUnneededPart * options_.least_gain);
@@ -160,6 +161,47 @@ class Report {
       }
     }
     d_.found = m.machine;
+  }
+
+  /// Of several amplitudes of an effect, those that may as well be as declared go back there, the
+  /// least certain first, and everything else is fitted again.
+  void put_back_undetermined() {
+    FittedMachine& m = selection_.found;
+    while (true) {
+      const std::map<std::string, Interval> intervals = intervals_of(evidence_, m, inexact());
+      double least = 1;
+      std::size_t effect = m.added.size(), number = 0;
+      for (std::size_t e = 0; e < m.added.size(); ++e) {
+        const AddedEffect& a = m.added[e];
+        const auto amplitudes =
+            std::count_if(a.numbers.begin(), a.numbers.end(),
+                          [&](const FreedNumber& n) { return !is_shape(a, n); });
+        for (std::size_t i = 0; i < a.numbers.size() && amplitudes > 1; ++i) {
+          const FreedNumber& n = a.numbers[i];
+          const auto known = intervals.find(n.number.key);
+          if (is_shape(a, n) || known == intervals.end()) continue;
+          const double off = std::abs(n.value - number_of(of_.declared, n.number.key)),
+                       certain = off / std::max(known->second.half_width, 1e-300);
+          if (certain < least) least = certain, effect = e, number = i;
+        }
+      }
+      if (effect == m.added.size()) break;
+      const std::string key = m.added[effect].numbers[number].number.key;
+      FittedMachine less = m;
+      forget(less, less.added[effect], number);
+      move_number(less.machine, key, number_of(of_.declared, key));
+      converge(evidence_, less);
+      if (less.held_out > m.held_out + options_.least_gain) break;
+      m = std::move(less);
+    }
+    d_.found = m.machine;
+  }
+
+  /// Whether a number only shapes its effect.
+  bool is_shape(const AddedEffect& a, const FreedNumber& n) const {
+    const Candidate& candidate = of_.candidates[a.candidate];
+    return std::any_of(candidate.shape.begin(), candidate.shape.end(),
+                       [&](std::size_t s) { return candidate.numbers[s].key == n.number.key; });
   }
 
   /// A wave of a negative amplitude is one of a positive amplitude half a period on: the first

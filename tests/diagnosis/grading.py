@@ -84,6 +84,11 @@ def first_number(effect):
     return 0.0
 
 
+def stem(key):
+    """The key without the component of a vector."""
+    return re.sub(r"\.[xyz]$", "", key)
+
+
 def numbers_of(found):
     return {n["key"]: n for n in found.get("parameters", [])}
 
@@ -110,7 +115,7 @@ def grade(answer, report, seconds):
         row["strength"] = math.nan if any(map(math.isnan, strengths)) else min(strengths)
         row["silent"] = not told and report["verdict"].startswith(SILENT)
         row["errors"], row["covered"] = [], []
-        for e, l in zip(effects, limits):
+        for e in effects:
             for f in told:
                 if not same(e, f):
                     continue
@@ -118,8 +123,8 @@ def grade(answer, report, seconds):
                     true = answer.get("values", {}).get(key)
                     if true is None or re.search(r"phase|angle_deg", key):
                         continue
-                    # L belongs to the first number only
-                    scale = abs(true) if l in (None, math.inf) else max(abs(true), 1e-12)
+                    # A component that is nearly nothing is held against the largest of its vector.
+                    scale = max(abs(v) for k, v in answer["values"].items() if stem(k) == stem(key))
                     row["errors"].append(abs(number["value"] - true) / max(scale, 1e-12))
                     row["covered"].append(number["low"] <= true <= number["high"])
     if row["kind"] in ("unknown", "without"):
