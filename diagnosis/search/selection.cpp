@@ -12,9 +12,9 @@
 namespace vcnc {
 namespace {
 
-constexpr double kClearLoss = 4;  ///< times the least gain: no need to look closer
+constexpr double kClearLoss = 4;      ///< times the least gain: no need to look closer
 constexpr std::size_t kAttempts = 3;  ///< contenders that are fitted together with all else
-constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
+constexpr double kNearLoss = 0.8;     ///< part of what an effect is worth that a rival must promise
 
 class Search {
  public:
