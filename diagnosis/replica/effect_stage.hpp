@@ -31,12 +31,13 @@ constexpr EffectStage stage_of() {
   return EffectStage::drive;
 }
 
-/// Effects that are nothing but chance: absent from a replica.
+/// Effects that are nothing but chance: absent from a replica. So is what an encoder rounds off: it
+/// depends on positions to a fraction of its step, and hides what a number changes by less.
 template <class Effect>
 constexpr bool is_chance() {
   return std::is_same_v<Effect, BusLoss> || std::is_same_v<Effect, BusJitter> ||
          std::is_same_v<Effect, SampleJitter> || std::is_same_v<Effect, AdcNoise> ||
-         std::is_same_v<Effect, DroppedSamples>;
+         std::is_same_v<Effect, DroppedSamples> || std::is_same_v<Effect, EncoderQuantisation>;
 }
 
 /// Why no hypothesis of a diagnosis is made of an effect; empty: one is.

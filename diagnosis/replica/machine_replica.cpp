@@ -138,11 +138,14 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
 
 MachineReplica::~MachineReplica() = default;
 
-MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine) const {
+MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine,
+                                                         Encoders encoders) const {
   Hypothesis h;
   h.machine = as_hypothesis(declared_, machine);
-  for_each_effect_of(h.machine.effects, []<class Effect>(Effect& effect, std::size_t) {
-    if (is_chance<Effect>()) effect = Effect();
+  for_each_effect_of(h.machine.effects, [&]<class Effect>(Effect& effect, std::size_t) {
+    const bool stays =
+        std::is_same_v<Effect, EncoderQuantisation> && encoders == Encoders::rounding;
+    if (is_chance<Effect>() && !stays) effect = Effect();
   });
   h.actual = vcnc::actual(h.machine);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
@@ -162,9 +165,10 @@ MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine)
 
 AxisReplays MachineReplica::axes_of(const Hypothesis& h) const {
   AxisReplays replays;
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+  parallel_for(kAxisCount, [&](std::size_t axis) {
     replays[axis] =
         axis_memory_[axis]->find_or_make(h.axis[axis], [&] { return replayed(h, axis); });
+  });
   return replays;
 }
 
@@ -266,6 +270,20 @@ Prediction MachineReplica::assembled(const AxisReplays& axes, const Deflections&
 Prediction MachineReplica::predict(const Machine& machine) const {
   const Hypothesis h = hypothesis_of(machine);
   return predict(h, axes_of(h));
+}
+
+std::vector<std::vector<double>> MachineReplica::rounding(const Machine& machine) const {
+  const Hypothesis exact = hypothesis_of(machine),
+                   rounded = hypothesis_of(machine, Encoders::rounding);
+  if (exact.axis == rounded.axis) return {};
+  const Prediction before = predict(exact, axes_of(exact)),
+                   after = predict(rounded, axes_of(rounded));
+  std::vector<std::vector<double>> change;
+  for (std::size_t c = 0; c < before.size(); ++c) {
+    change.push_back(after[c]);
+    for (std::size_t k = 0; k < change[c].size(); ++k) change[c][k] -= before[c][k];
+  }
+  return change;
 }
 
 Prediction MachineReplica::predict(const Hypothesis& h, const AxisReplays& axes) const {

@@ -53,6 +53,8 @@ class MachineReplica : public Replica {
   /// The same with the probe in full, too, and without the memory of earlier predictions.
   Prediction predict_in_full(const Machine& hypothesis) const;
 
+  std::vector<std::vector<double>> rounding(const Machine& machine) const override;
+
   /// What follows is asked about machines near this one. Not while others predict.
   void anchor(const Machine& machine) override;
 
@@ -63,7 +65,8 @@ class MachineReplica : public Replica {
 
   struct Hypothesis;
   struct Anchor;
-  Hypothesis hypothesis_of(const Machine& machine) const;
+  enum class Encoders { exact, rounding };
+  Hypothesis hypothesis_of(const Machine& machine, Encoders encoders = Encoders::exact) const;
   AxisReplays axes_of(const Hypothesis& hypothesis) const;
   std::shared_ptr<const Poses> poses_of(const Hypothesis& hypothesis) const;
   std::shared_ptr<const Deflections> ball_of(const Hypothesis& hypothesis,

@@ -58,6 +58,9 @@ class Replica {
     for (const Machine& h : hypotheses) all.push_back(predict(h));
     return all;
   }
+  /// A sample of what the rounding of the encoders that a machine declares does to each channel,
+  /// which no prediction has in it; empty where there is none.
+  virtual std::vector<std::vector<double>> rounding(const Machine&) const { return {}; }
   /// What follows is asked about machines near this one: a replica may be exact here and quicker
   /// elsewhere. Not while others predict.
   virtual void anchor(const Machine&) {}

@@ -74,7 +74,11 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
     for (std::size_t k = 0; k < difference[c].size(); ++k)
       difference[c][k] = raw_valid_[c][k] ? measured_[c][k] - declared_[c][k] : kMissing;
   take_out_shifts(declared, difference);
-  noise_ = audit_noise(record, partition_, channels, difference);
+  SeriesOfChannels rounding = replica.rounding(declared);
+  for (std::size_t c = 0; c < rounding.size(); ++c)
+    for (std::size_t k = 0; k < rounding[c].size(); ++k)
+      if (!raw_valid_[c][k]) rounding[c][k] = kMissing;
+  noise_ = audit_noise(record, partition_, channels, difference, rounding);
   for (ChannelNoise& channel : noise_.channels) channel.filter.scale *= noise_scale;
 
   for (std::size_t c = 0; c < channels.size(); ++c) {
@@ -363,13 +367,12 @@ BlockGrams Evidence::grams(const std::vector<const Column*>& columns) const {
 RoleGrams Evidence::products(const std::vector<const Column*>& columns) const {
   const auto m = static_cast<Eigen::Index>(columns.size());
   RoleGrams all = RoleGrams::none(m, m, valid_.size());
-  std::vector<Eigen::MatrixXd> fitted = all.held_out_of;
   parallel_for(valid_.size(), [&](std::size_t c) {
     for (const Block& block : partition_.blocks)
-      add_products(columns, c, block, block.held_out ? all.held_out_of[c] : fitted[c]);
+      add_products(columns, c, block, block.held_out ? all.held_out_of[c] : all.fitted_of[c]);
   });
   for (std::size_t c = 0; c < valid_.size(); ++c) {
-    all.fitted += fitted[c];
+    all.fitted += all.fitted_of[c];
     all.held_out += all.held_out_of[c];
   }
   return all;
@@ -387,11 +390,12 @@ RoleGrams Evidence::cross(const std::vector<const Column*>& a,
         const std::vector<float>& x = (*a[i])[c];
         if (x.empty()) continue;
         for (const Block& block : partition_.blocks)
-          (block.held_out ? all.held_out_of[c] : all.fitted)(static_cast<Eigen::Index>(i),
-                                                             static_cast<Eigen::Index>(j)) +=
+          (block.held_out ? all.held_out_of : all.fitted_of)[c](static_cast<Eigen::Index>(i),
+                                                                static_cast<Eigen::Index>(j)) +=
               dot(&x[block.begin], &y[block.begin], block.end - block.begin);
       }
     }
+    all.fitted += all.fitted_of[c];
     all.held_out += all.held_out_of[c];
   }
   return all;

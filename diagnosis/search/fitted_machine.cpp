@@ -21,10 +21,27 @@ void settle(const Evidence& evidence, FittedMachine& m, const Refit& f) {
   m.held_out = ground.held_out;
 }
 
+/// Times its noise that a channel may be off before it loses weight.
+constexpr double kLoud = 2;
+
+/// Weight of each channel: one that is far off tells of something missing, not of the numbers that
+/// are there, and would pull them anywhere. (As if its noise were what it is off.)
+std::vector<double> weights(const Evidence& evidence, const Column& residual) {
+  std::vector<double> all(residual.size(), 1.0);
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    const double off = evidence.chi2(residual, c, Role::fitted);
+    const double expected = kLoud * kLoud * evidence.count(c, Role::fitted);
+    if (off > expected) all[c] = expected / off;
+  }
+  return all;
+}
+
 /// Chi-square of the fitted laps with what the numbers are off their declaration.
-double misfit(const Evidence& evidence, const Column& residual,
+double misfit(const Evidence& evidence, const Column& residual, const std::vector<double>& weight,
               const std::vector<FreedNumber>& numbers) {
-  double sum = evidence.chi2(residual, Role::fitted);
+  double sum = 0;
+  for (std::size_t c = 0; c < weight.size(); ++c)
+    sum += weight[c] * evidence.chi2(residual, c, Role::fitted);
   for (const FreedNumber& n : numbers) sum += n.pull() * n.pull();
   return sum;
 }
@@ -49,9 +66,13 @@ std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vect
   return to;
 }
 
+constexpr double kNoStep = 1;  ///< chi-square that no step is worth
+
 /// Goes as far towards a refit as makes the misfit smaller: sensitivities are not everywhere what
 /// they are where they were taken. False: not a step.
-bool step_towards(const Evidence& evidence, FittedMachine& m, const Refit& f, double& least) {
+bool step_towards(const Evidence& evidence, FittedMachine& m, const Refit& f,
+                  const std::vector<double>& weight, double least) {
+  if (least - f.fitted < kNoStep) return false;
   std::vector<FreedNumber> old = m.nuisances.numbers;
   for (const FreedNumber& n : m.numbers()) old.push_back(n);
   for (const double share : {1.0, 0.5, 0.2, 0.05}) {
@@ -61,9 +82,9 @@ bool step_towards(const Evidence& evidence, FittedMachine& m, const Refit& f, do
     part.machine = with(with(m.machine, part.live), part.linear);
     FittedMachine trial = m;
     settle(evidence, trial, part);
-    const double now = misfit(evidence, trial.residual, trial.nuisances.numbers);
+    const double now = misfit(evidence, trial.residual, weight, trial.nuisances.numbers);
+    if (now > least && now - least < kNoStep) return false;
     if (!(now < least)) continue;
-    least = now;
     m = std::move(trial);
     return true;
   }
@@ -82,8 +103,20 @@ void linearise_nuisances(const Evidence& evidence, FittedMachine& m) {
   m.nuisances.columns = columns_of(evidence, m.machine, m.prediction, m.nuisances.numbers);
 }
 
-constexpr int kLinearisations = 3;  ///< at most, of the declared machine
-constexpr double kSettled = 5;      ///< chi-square that no further one is worth
+/// Takes sensitivities where the machine stands and fits, until that changes nothing.
+void settle_in(Evidence& evidence, FittedMachine& m) {
+  constexpr int kLinearisations = 3;
+  constexpr double kSettled = 5;  // chi-square that no further one is worth
+  for (int round = 0; round < kLinearisations; ++round) {
+    const double before = m.held_out;
+    linearise_nuisances(evidence, m);
+    converge(evidence, m);
+    if (before - m.held_out < kSettled) break;
+  }
+}
+
+/// Tolerances from which on a declared number may stand for something that is missing.
+constexpr double kPulledFar = 3;
 
 }  // namespace
 
@@ -106,15 +139,17 @@ LinearPart FittedMachine::linear() const {
 void converge(const Evidence& evidence, FittedMachine& m) {
   constexpr int kRounds = 3;
   double before = m.held_out;
-  double least =
-      misfit(evidence, evidence.residual(evidence.predict(m.machine)), m.nuisances.numbers);
+  Column residual = evidence.residual(evidence.predict(m.machine));
   for (int round = 0; round < kRounds; ++round) {
     const std::vector<FreedNumber> live = m.numbers();
-    const Refit f = refit(evidence, m.machine, live, without(m.nuisances, live), 8);
-    if (!step_towards(evidence, m, f, least)) {
+    const std::vector<double> weight = weights(evidence, residual);
+    const double least = misfit(evidence, residual, weight, m.nuisances.numbers);
+    const Refit f = refit(evidence, m.machine, live, without(m.nuisances, live), 8, weight);
+    if (!step_towards(evidence, m, f, weight, least)) {
       if (round == 0) stay(evidence, m);
       break;
     }
+    residual = m.residual;
     const double now = m.held_out;
     if (std::abs(before - now) < 1 + 1e-4 * std::abs(now - evidence.count(Role::held_out))) break;
     before = now;
@@ -143,13 +178,22 @@ FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
   converge(evidence, m);
   evidence.anchor(m.machine);
   converge(evidence, m);
-  for (int round = 0; round < kLinearisations; ++round) {
-    const double before = m.held_out;
-    linearise_nuisances(evidence, m);
-    converge(evidence, m);
-    if (before - m.held_out < kSettled) break;
-  }
+  settle_in(evidence, m);
   return m;
+}
+
+void begin_anew(Evidence& evidence, FittedMachine& m) {
+  const auto pulled = [](const FreedNumber& n) { return std::abs(n.pull()) > kPulledFar; };
+  if (std::none_of(m.nuisances.numbers.begin(), m.nuisances.numbers.end(), pulled)) return;
+  FittedMachine anew = m;
+  for (FreedNumber& n : anew.nuisances.numbers)
+    if (n.tolerance > 0) n.value = n.centre;
+  anew.machine = with(anew.machine, anew.nuisances.numbers);
+  evidence.anchor(anew.machine);
+  stay(evidence, anew);
+  settle_in(evidence, anew);
+  if (anew.held_out < m.held_out) m = std::move(anew);
+  evidence.anchor(m.machine);
 }
 
 }  // namespace vcnc

@@ -38,6 +38,10 @@ struct FittedMachine {
 /// Fits all numbers of a machine together, nuisances included, until nothing moves.
 void converge(const Evidence& evidence, FittedMachine& machine);
 
+/// Declared numbers may have been pulled far by an effect that was missing: where some are, fits
+/// again from their declarations and keeps what is better.
+void begin_anew(Evidence& evidence, FittedMachine& machine);
+
 /// The declared machine with its nuisances fitted, or with these numbers.
 FittedMachine fit_declared(Evidence& evidence, const Machine& declared);
 FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,

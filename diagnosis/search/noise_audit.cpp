@@ -73,6 +73,19 @@ std::vector<LapNoise> lap_noise(const Partition& partition, const Series& residu
   return all;
 }
 
+/// The stretches as they are, less their straight lines; every other one is held out.
+std::vector<LapNoise> whole_laps(const Partition& partition, const Series& value) {
+  std::vector<LapNoise> all;
+  for (const Stretch& s : partition.stretches) {
+    LapNoise lap{Series(value.begin() + static_cast<std::ptrdiff_t>(s.begin),
+                        value.begin() + static_cast<std::ptrdiff_t>(s.end)),
+                 all.size() % 2 == 0};
+    remove_line(lap.value);
+    all.push_back(std::move(lap));
+  }
+  return all;
+}
+
 /// Autocovariances over all stretches without gaps.
 Series covariances(const std::vector<LapNoise>& laps) {
   Series sum(kWhiteningOrder + 1, 0.0), count(kWhiteningOrder + 1, 0.0);
@@ -203,7 +216,8 @@ WhiteningFilter fit_autoregression(const std::vector<double>& covariance) {
 
 NoiseAudit audit_noise(const Record& record, const Partition& partition,
                        const std::vector<ComparedChannel>& channels,
-                       const std::vector<std::vector<double>>& residual) {
+                       const std::vector<std::vector<double>>& residual,
+                       const std::vector<std::vector<double>>& rounding) {
   NoiseAudit audit;
   audit.from_repetitions = partition.repeated;
   if (!partition.repeated)
@@ -213,17 +227,13 @@ NoiseAudit audit_noise(const Record& record, const Partition& partition,
         "every effect; how much is left unexplained cannot be told.");
   for (std::size_t c = 0; c < channels.size(); ++c) {
     std::vector<LapNoise> laps = lap_noise(partition, residual[c]);
-    if (laps.empty()) {
-      bool odd = false;
-      for (const Stretch& s : partition.stretches) {
-        LapNoise lap{Series(residual[c].begin() + static_cast<std::ptrdiff_t>(s.begin),
-                            residual[c].begin() + static_cast<std::ptrdiff_t>(s.end)),
-                     odd = !odd};
-        remove_line(lap.value);
-        laps.push_back(std::move(lap));
-      }
-    }
+    if (laps.empty()) laps = whole_laps(partition, residual[c]);
     Series covariance = covariances(laps);
+    const double of_laps = covariance[0];
+    if (!rounding.empty()) {
+      const Series more = covariances(whole_laps(partition, rounding[c]));
+      for (std::size_t j = 0; j < more.size(); ++j) covariance[j] += more[j];
+    }
     const double resolution = resolution_of(record, channels[c]);
     const double least = resolution * resolution / 12 +
                          exactness(channels[c], residual[c]) * exactness(channels[c], residual[c]);
@@ -236,7 +246,7 @@ NoiseAudit audit_noise(const Record& record, const Partition& partition,
     const double left = left_by(noise.filter, laps);
     noise.whiteness = expected / covariance[0];
     // Where the laps are quieter than the channel can be, what it can be counts.
-    noise.filter.scale = std::sqrt(quiet ? expected : left);
+    noise.filter.scale = std::sqrt(quiet || covariance[0] > of_laps ? expected : left);
     if (audit.from_repetitions) {
       const std::vector<NoiseLine> lines =
           find_lines(channels[c], laps, record.period, 0.1 * std::sqrt(least));

@@ -11,6 +11,9 @@
 // repeat (hum, vibration) belongs to that noise; it is seen as a line in the periodogram of d_i,
 // 40 times above the running median.
 //
+// Rounding by an encoder depends on where the axis is, so it repeats from lap to lap though nobody
+// can predict it: a sample of it is added, which counts double what laps do show of it.
+//
 // A channel can never be quieter than its own step (q^2/12, Widrow 1956), nor than the replica is
 // exact. Without repetitions the filter is fitted to the residual itself: all it can predict from
 // its own past counts as noise, so that effects are underrated, not overrated.
@@ -58,9 +61,11 @@ struct NoiseAudit {
   std::vector<std::string> warnings;
 };
 
-/// `residual` is one series per channel, NaN where there is nothing to compare.
+/// `residual` is one series per channel, NaN where there is nothing to compare; `rounding`
+/// likewise, or empty (Replica::rounding()).
 NoiseAudit audit_noise(const Record& record, const Partition& partition,
                        const std::vector<ComparedChannel>& channels,
-                       const std::vector<std::vector<double>>& residual);
+                       const std::vector<std::vector<double>>& residual,
+                       const std::vector<std::vector<double>>& rounding = {});
 
 }  // namespace vcnc

@@ -155,7 +155,7 @@ std::vector<Column> columns_of(const Evidence& evidence, const Machine& machine,
 }
 
 Refit refit(const Evidence& evidence, const Machine& start, const std::vector<FreedNumber>& live,
-            const LinearPart& linear, int max_iterations) {
+            const LinearPart& linear, int max_iterations, const std::vector<double>& weight) {
   Refit result;
   const auto k = static_cast<Eigen::Index>(live.size());
   const Products products(evidence, linear.columns);
@@ -196,7 +196,8 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
     const Point& p = visit(x, derivatives);
     const std::vector<Column> none;
     const Eigen::Index used = derivatives ? k : 0;
-    const Eigen::MatrixXd g = products.with(p.residual, derivatives ? p.columns : none).fitted;
+    const Eigen::MatrixXd g =
+        products.with(p.residual, derivatives ? p.columns : none).fitted_with(weight);
     const Eliminated e = eliminate(g, used, linear);
     Linearisation at{e.cost, {}, {}};
     if (derivatives) {
@@ -221,7 +222,7 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
   Point& best = visit(solution.x, true);
   const RoleGrams grams = products.with(best.residual, {});
   const LinearStep step =
-      linear_step(grams.fitted, grams.held_out, linear.precision(), linear.offset());
+      linear_step(grams.fitted_with(weight), grams.held_out, linear.precision(), linear.offset());
   result.live = moved(live, solution.x);
   result.linear = linear.numbers;
   for (std::size_t i = 0; i < result.linear.size(); ++i) {

@@ -52,8 +52,10 @@ struct Refit {
   int simulations = 0;
 };
 
+/// `weight` of each channel's chi-square in what is made least; none given: all 1.
 Refit refit(const Evidence& evidence, const Machine& start, const std::vector<FreedNumber>& live,
-            const LinearPart& linear, int max_iterations = 12);
+            const LinearPart& linear, int max_iterations = 12,
+            const std::vector<double>& weight = {});
 
 /// Forward differences of a prediction with respect to some numbers, per typical size.
 std::vector<Column> columns_of(const Evidence& evidence, const Machine& machine,

@@ -19,25 +19,38 @@ Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 
 }  // namespace
 
+Eigen::MatrixXd RoleGrams::fitted_with(const std::vector<double>& weight) const {
+  if (weight.empty()) return fitted;
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(fitted.rows(), fitted.cols());
+  for (std::size_t c = 0; c < fitted_of.size(); ++c) sum += weight[c] * fitted_of[c];
+  return sum;
+}
+
 RoleGrams RoleGrams::none(Eigen::Index rows, Eigen::Index cols, std::size_t channels) {
   const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(rows, cols);
-  return {zero, zero, std::vector<Eigen::MatrixXd>(channels, zero)};
+  const std::vector<Eigen::MatrixXd> zeros(channels, zero);
+  return {zero, zero, zeros, zeros};
 }
 
 RoleGrams bordered(const RoleGrams& a, const RoleGrams& across, const RoleGrams& b) {
   if (b.fitted.size() == 0) return a;
   RoleGrams all{bordered(a.fitted, across.fitted, b.fitted),
                 bordered(a.held_out, across.held_out, b.held_out),
+                {},
                 {}};
-  for (std::size_t c = 0; c < a.held_out_of.size(); ++c)
+  for (std::size_t c = 0; c < a.held_out_of.size(); ++c) {
+    all.fitted_of.push_back(bordered(a.fitted_of[c], across.fitted_of[c], b.fitted_of[c]));
     all.held_out_of.push_back(bordered(a.held_out_of[c], across.held_out_of[c], b.held_out_of[c]));
+  }
   return all;
 }
 
 RoleGrams beside(const RoleGrams& a, const RoleGrams& b) {
-  RoleGrams both{beside(a.fitted, b.fitted), beside(a.held_out, b.held_out), {}};
-  for (std::size_t c = 0; c < a.held_out_of.size(); ++c)
+  RoleGrams both{beside(a.fitted, b.fitted), beside(a.held_out, b.held_out), {}, {}};
+  for (std::size_t c = 0; c < a.held_out_of.size(); ++c) {
+    both.fitted_of.push_back(beside(a.fitted_of[c], b.fitted_of[c]));
     both.held_out_of.push_back(beside(a.held_out_of[c], b.held_out_of[c]));
+  }
   return both;
 }
 

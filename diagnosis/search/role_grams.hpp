@@ -12,7 +12,10 @@ namespace vcnc {
 
 struct RoleGrams {
   Eigen::MatrixXd fitted, held_out;
-  std::vector<Eigen::MatrixXd> held_out_of;  ///< per channel; they add up to held_out
+  std::vector<Eigen::MatrixXd> fitted_of, held_out_of;  ///< per channel; they add up to the others
+
+  /// What is fitted, every channel with its weight; none given: all 1.
+  Eigen::MatrixXd fitted_with(const std::vector<double>& weight) const;
 
   /// All zero.
   static RoleGrams none(Eigen::Index rows, Eigen::Index cols, std::size_t channels);

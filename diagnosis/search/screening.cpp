@@ -161,8 +161,10 @@ void RememberedProducts::learn(const Evidence& evidence, const std::vector<const
     const Eigen::Index row = old ? r - others_.begin() : next++;
     all.fitted.row(i) = from.fitted.row(row);
     all.held_out.row(i) = from.held_out.row(row);
-    for (std::size_t c = 0; c < all.held_out_of.size(); ++c)
+    for (std::size_t c = 0; c < all.held_out_of.size(); ++c) {
+      all.fitted_of[c].row(i) = from.fitted_of[c].row(row);
       all.held_out_of[c].row(i) = from.held_out_of[c].row(row);
+    }
   }
   products_ = std::move(all);
   others_.clear();

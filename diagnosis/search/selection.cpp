@@ -145,6 +145,7 @@ class Search {
     for (AddedEffect& a : m.added) adopt(a.numbers, best.fit.linear);
     evidence_.anchor(m.machine);
     converge(evidence_, m);
+    begin_anew(evidence_, m);
   }
 
   /// Removes what the others can do without, and says what each one is worth.

@@ -30,6 +30,8 @@ The force falls with the speed below v_s.)",
       .showing = Showing::circle};
   static constexpr bool dissipative = true;
 
+  static constexpr double kFaded = 60;  ///< e^-60 is nothing beside any force
+
   double excess = 0;       ///< [N or N m]
   double velocity = 2e-3;  ///< [m/s or rad/s]
 
@@ -51,7 +53,7 @@ The force falls with the speed below v_s.)",
   void step(Port::Signal<T>& signal, const Port::Context<T>& context) const {
     using std::exp;
     const T x = context.velocity / velocity;
-    signal.dry += excess * exp(-x * x);
+    if (x * x < kFaded) signal.dry += excess * exp(-x * x);
   }
 };
 
