@@ -15,6 +15,7 @@ namespace {
 constexpr int kGlance = 4;        ///< iterations to see what a candidate is worth
 constexpr double kUsual = 1;      ///< decades about the typical size
 constexpr double kPromise = 0.3;  ///< of what is needed: worth a refit
+constexpr double kBothLaps = 2;   ///< gain on held-out laps per gain on fitted ones, at most
 constexpr std::size_t kFinalists = 3, kRivals = 4, kMoreRefits = 8;
 
 void sort_by_worth(std::vector<Contender>& all) {
@@ -177,6 +178,13 @@ double Contest::intricacy(const Contender& c) const {
   return static_cast<double>(c.numbers.size()) + 2 * unusual;
 }
 
+/// Of what is left on the laps that are fitted and on those that are held out. What helps the
+/// latter far more makes up for declared numbers that the former leave open: a drift of which they
+/// see one value only.
+double Contest::gain_of(double fitted, double held_out) const {
+  return std::min(ground_.held_out - held_out, kBothLaps * (ground_.fitted - fitted));
+}
+
 Contender Contest::contender(const std::vector<std::size_t>& trials, const Eigen::VectorXd& size,
                              double promised) const {
   Contender best;
@@ -197,7 +205,7 @@ Contender Contest::contender(const std::vector<std::size_t>& trials, const Eigen
     c.candidate = rules_.trials[trials.front()].trial.candidate;
     c.fit = refit(rules_.evidence, now_.machine, c.numbers, without(linear_, c.numbers), kGlance);
     c.numbers = c.fit.live;
-    c.gain = ground_.held_out - c.fit.held_out;
+    c.gain = gain_of(c.fit.fitted, c.fit.held_out);
     const bool first = share == 1.0;
     if (first || c.gain > best.gain) best = std::move(c);
     if (best.gain > 0.5 * promised) break;
@@ -220,7 +228,7 @@ void Contest::finish(std::vector<Contender>& all) const {
     c.converged = true;
     c.fit = refit(rules_.evidence, now_.machine, c.numbers, without(linear_, c.numbers));
     c.numbers = c.fit.live;
-    c.gain = ground_.held_out - c.fit.held_out;
+    c.gain = gain_of(c.fit.fitted, c.fit.held_out);
   });
 }
 
@@ -241,7 +249,7 @@ std::vector<Contender> Contest::releases() const {
     Contender c;
     c.released = n.number.key;
     c.numbers = {n};
-    c.gain = ground_.held_out - s.held_out;
+    c.gain = gain_of(s.fitted, s.held_out);
     c.fit.held_out_of = left_after(ground_.grams.held_out_of, s.step);
     all.push_back(std::move(c));
   }

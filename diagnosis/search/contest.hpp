@@ -66,6 +66,7 @@ class Contest {
                                  const std::vector<Screened>& screened,
                                  const std::vector<Screened>& list) const;
   std::vector<Contender> refitted(const std::vector<Screened>& list) const;
+  double gain_of(double fitted, double held_out) const;
   Contender contender(const std::vector<std::size_t>& trials, const Eigen::VectorXd& size,
                       double promised) const;
   void finish(std::vector<Contender>& all) const;

@@ -46,10 +46,6 @@ double misfit(const Evidence& evidence, const Column& residual, const std::vecto
   return sum;
 }
 
-/// Declared numbers are not believed to be off by more than this many tolerances, wherever the
-/// sensitivities point to; further ones are released or compete as effects.
-constexpr double kFarthestPull = 20;
-
 /// Part of the way from `from` to `to`.
 std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vector<FreedNumber> to,
                                  double share) {
@@ -104,7 +100,7 @@ void linearise_nuisances(const Evidence& evidence, FittedMachine& m) {
 }
 
 /// Takes sensitivities where the machine stands and fits, until that changes nothing.
-void settle_in(Evidence& evidence, FittedMachine& m) {
+void fit_in_rounds(const Evidence& evidence, FittedMachine& m) {
   constexpr int kLinearisations = 3;
   constexpr double kSettled = 5;  // chi-square that no further one is worth
   for (int round = 0; round < kLinearisations; ++round) {
@@ -116,7 +112,7 @@ void settle_in(Evidence& evidence, FittedMachine& m) {
 }
 
 /// Tolerances from which on a declared number may stand for something that is missing.
-constexpr double kPulledFar = 3;
+constexpr double kPulledFar = 1.5;
 
 }  // namespace
 
@@ -178,21 +174,26 @@ FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
   converge(evidence, m);
   evidence.anchor(m.machine);
   converge(evidence, m);
-  settle_in(evidence, m);
+  fit_in_rounds(evidence, m);
   return m;
 }
 
-void begin_anew(Evidence& evidence, FittedMachine& m) {
-  const auto pulled = [](const FreedNumber& n) { return std::abs(n.pull()) > kPulledFar; };
-  if (std::none_of(m.nuisances.numbers.begin(), m.nuisances.numbers.end(), pulled)) return;
-  FittedMachine anew = m;
-  for (FreedNumber& n : anew.nuisances.numbers)
-    if (n.tolerance > 0) n.value = n.centre;
-  anew.machine = with(anew.machine, anew.nuisances.numbers);
-  evidence.anchor(anew.machine);
-  stay(evidence, anew);
-  settle_in(evidence, anew);
-  if (anew.held_out < m.held_out) m = std::move(anew);
+void settle_in(Evidence& evidence, FittedMachine& m) {
+  evidence.anchor(m.machine);
+  fit_in_rounds(evidence, m);
+  const bool far =
+      std::any_of(m.nuisances.numbers.begin(), m.nuisances.numbers.end(),
+                  [](const FreedNumber& n) { return std::abs(n.pull()) > kPulledFar; });
+  if (far) {
+    FittedMachine anew = m;
+    for (FreedNumber& n : anew.nuisances.numbers)
+      if (n.tolerance > 0) n.value = n.centre;
+    anew.machine = with(anew.machine, anew.nuisances.numbers);
+    evidence.anchor(anew.machine);
+    stay(evidence, anew);
+    fit_in_rounds(evidence, anew);
+    if (anew.held_out < m.held_out + kNoStep) m = std::move(anew);
+  }
   evidence.anchor(m.machine);
 }
 

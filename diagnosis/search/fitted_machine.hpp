@@ -38,9 +38,10 @@ struct FittedMachine {
 /// Fits all numbers of a machine together, nuisances included, until nothing moves.
 void converge(const Evidence& evidence, FittedMachine& machine);
 
-/// Declared numbers may have been pulled far by an effect that was missing: where some are, fits
-/// again from their declarations and keeps what is better.
-void begin_anew(Evidence& evidence, FittedMachine& machine);
+/// After an effect was added: takes the sensitivities of the declared numbers where the machine now
+/// stands and fits all together. Where the effect had been missing, some may have been pulled far;
+/// then fits again from the declarations, too, and keeps what is better.
+void settle_in(Evidence& evidence, FittedMachine& machine);
 
 /// The declared machine with its nuisances fitted, or with these numbers.
 FittedMachine fit_declared(Evidence& evidence, const Machine& declared);

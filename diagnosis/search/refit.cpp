@@ -48,6 +48,42 @@ struct Point {
   std::vector<Column> columns;
 };
 
+/// Minimum of s' A s - 2 b' s with no number further off its declaration than it is believed to be.
+struct BoundedStep {
+  Eigen::VectorXd step;
+  std::vector<Eigen::Index> free;  ///< numbers that are not at their bound
+};
+
+BoundedStep bounded_step(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
+                         const Eigen::VectorXd& precision, const Eigen::VectorXd& offset) {
+  BoundedStep s{Eigen::VectorXd::Zero(b.size()), {}};
+  for (Eigen::Index i = 0; i < b.size(); ++i) s.free.push_back(i);
+  while (!s.free.empty()) {
+    const Eigen::VectorXd left = b - a * s.step;  // of those at their bounds; the others are 0 here
+    const Eigen::MatrixXd part = a(s.free, s.free);
+    const Eigen::VectorXd inner = part.ldlt().solve(Eigen::VectorXd(left(s.free)));
+    std::vector<Eigen::Index> inside;
+    Eigen::VectorXd step = s.step;
+    for (std::size_t k = 0; k < s.free.size(); ++k) {
+      const Eigen::Index i = s.free[k];
+      const double reach = kFarthestPull / std::sqrt(precision[i]);  // infinite without a tolerance
+      const double to = offset[i] + inner[static_cast<Eigen::Index>(k)];
+      if (std::abs(to) <= reach) {
+        inside.push_back(i);
+        continue;
+      }
+      s.step[i] = std::clamp(to, -reach, reach) - offset[i];
+    }
+    if (inside.size() == s.free.size()) {
+      s.step = std::move(step);
+      s.step(s.free) = inner;
+      break;
+    }
+    s.free = std::move(inside);
+  }
+  return s;
+}
+
 /// Solves for the linear numbers at z; products of [z, J..., N...].
 struct Eliminated {
   double cost = 0;
@@ -71,13 +107,17 @@ Eliminated eliminate(const Eigen::MatrixXd& g, Eigen::Index live, const LinearPa
   a.diagonal().array() += 1e-12 * (1 + a.diagonal().maxCoeff());
   const Eigen::VectorXd b =
       g.block(1 + live, 0, n, 1) - Eigen::VectorXd(precision.cwiseProduct(offset));
-  const Eigen::LDLT<Eigen::MatrixXd> factor(a);
-  e.step = factor.solve(b);
-  e.cost -= b.dot(e.step);
+  BoundedStep bounded = bounded_step(a, b, precision, offset);
+  e.step = std::move(bounded.step);
+  e.cost += e.step.dot(a * e.step) - 2 * b.dot(e.step);
   if (live > 0) {
     const Eigen::MatrixXd nj = g.block(1 + live, 1, n, live);
     e.gradient += nj.transpose() * e.step;
-    e.gram -= nj.transpose() * factor.solve(nj);
+    if (!bounded.free.empty()) {
+      const Eigen::MatrixXd free = nj(bounded.free, Eigen::all);
+      const Eigen::MatrixXd part = a(bounded.free, bounded.free);
+      e.gram -= free.transpose() * part.ldlt().solve(free);
+    }
   }
   return e;
 }
@@ -121,7 +161,7 @@ LinearStep linear_step(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& hel
   a.diagonal().array() += 1e-10 * (1e-6 + a.diagonal().array());
   const Eigen::VectorXd b =
       fitted.block(1, 0, n, 1) - Eigen::VectorXd(precision.cwiseProduct(offset));
-  s.step = n > 0 ? Eigen::VectorXd(a.ldlt().solve(b)) : Eigen::VectorXd();
+  s.step = bounded_step(a, b, precision, offset).step;
   const Eigen::VectorXd at = offset + s.step;
   const double prior = at.dot(precision.cwiseProduct(at));
   s.fitted = left_after(fitted, s.step) + prior;

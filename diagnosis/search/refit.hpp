@@ -6,6 +6,8 @@
 //   min over x, d of |z(x) - N d|^2 + (o + d)' P (o + d)
 //
 // with o the present distance of the linear numbers from their declaration and P their precision.
+// No number of a tolerance is taken further than kFarthestPull of them off its declaration: where
+// something is missing, sensitivities would point to numbers that only cancel each other.
 #pragma once
 
 #include <Eigen/Dense>
@@ -16,6 +18,10 @@
 #include "diagnosis/search/least_squares.hpp"
 
 namespace vcnc {
+
+/// Tolerances that a declared number is believed to be off at most; one that is further off is
+/// released, or competes as an effect.
+inline constexpr double kFarthestPull = 6;
 
 /// Numbers with the columns d yhat / d number, per typical size.
 struct LinearPart {

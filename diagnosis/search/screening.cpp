@@ -176,6 +176,7 @@ Ground::Ground(const Evidence& evidence, const Column& residual, const LinearPar
   for (const Column& c : linear.columns) columns.push_back(&c);
   grams = evidence.products(columns);
   const LinearStep at = linear_step(grams.fitted, grams.held_out, precision, offset);
+  fitted = at.fitted;
   held_out = at.held_out;
   held_out_of = left_after(grams.held_out_of, at.step);
 }

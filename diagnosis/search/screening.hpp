@@ -68,7 +68,7 @@ struct Ground {
   std::vector<const Column*> columns;  ///< the residual, then those of the linear numbers
   RoleGrams grams;
   Eigen::VectorXd precision, offset;
-  double held_out = 0;              ///< chi-square with priors, the linear numbers fitted
+  double fitted = 0, held_out = 0;  ///< chi-square with priors, the linear numbers fitted
   std::vector<double> held_out_of;  ///< of it per channel, without priors
 };
 

@@ -121,6 +121,7 @@ class Search {
         if (n.number.key == best.released) n.tolerance = 0;
       m.released.push_back(best.released);
       converge(evidence_, m);
+      settle_in(evidence_, m);
       return;
     }
     // Numbers belong to the candidate whose keys they have; a pair brings two.
@@ -145,7 +146,7 @@ class Search {
     for (AddedEffect& a : m.added) adopt(a.numbers, best.fit.linear);
     evidence_.anchor(m.machine);
     converge(evidence_, m);
-    begin_anew(evidence_, m);
+    settle_in(evidence_, m);
   }
 
   /// Removes what the others can do without, and says what each one is worth.
