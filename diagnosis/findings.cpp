@@ -523,9 +523,8 @@ class Report {
     for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
       rms.push_back(evidence_.rms(selection_.base.prediction, c, Role::held_out));
     d_.ladder.push_back({"declared", selection_.base.held_out / std::max(1.0, floor_), rms});
-    for (std::size_t i = 0; i < selection_.rung_chi2.size(); ++i)
-      d_.ladder.push_back({selection_.rung_name[i], selection_.rung_chi2[i] / std::max(1.0, floor_),
-                           selection_.rung_rms[i]});
+    for (const LadderStep& r : selection_.ladder)
+      d_.ladder.push_back({r.name, r.held_out / std::max(1.0, floor_), r.rms});
   }
 
   void judge() {

@@ -14,7 +14,8 @@ namespace {
 
 constexpr double kClearLoss = 4;      ///< times the least gain: no need to look closer
 constexpr std::size_t kAttempts = 3;  ///< contenders that are fitted together with all else
-constexpr double kNearLoss = 0.8;     ///< part of what an effect is worth that a rival must promise
+constexpr std::size_t kAlternatives = 2;
+constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
 
 class Search {
  public:
@@ -32,13 +33,21 @@ class Search {
     rules_.floor = result_.floor =
         noise_floor(evidence_, result_.base.residual, options_.form_of_channel);
     rules_.base_of = evidence_.chi2_of(result_.base.residual, Role::held_out);
-    FittedMachine& now = result_.found = result_.base;
     simulate();
-    while (now.added.size() + now.released.size() < options_.max_effects && going_) {
-      Contest contest(rules_, now);
-      if (!accept_one(now, contest.contenders(), contest)) break;
-      exchange(now);
-      tell_rung(now);
+    result_.found = result_.base;
+    if (going_) {
+      Contest contest(rules_, result_.base);
+      const std::vector<Contender> contenders = contest.contenders();
+      result_.found = climbed(contenders, contest, result_.ladder);
+      for (const Contender& other : alternatives(contenders)) {
+        if (!going_ || result_.found.held_out < options_.model_form * result_.floor) break;
+        std::vector<LadderStep> ladder;
+        FittedMachine found = climbed({other}, contest, ladder);
+        if (!going_ || found.held_out > result_.found.held_out - options_.least_gain) continue;
+        result_.found = std::move(found);
+        result_.ladder = std::move(ladder);
+      }
+      evidence_.anchor(result_.found.machine);
     }
     result_.interrupted = !going_;
     return std::move(result_);
@@ -49,6 +58,33 @@ class Search {
     const std::lock_guard lock(guard_);
     if (going_ && keep_going_ && !keep_going_({doing, share})) going_ = false;
     return going_;
+  }
+
+  /// The base machine with one of the contenders, and then one effect after the other until none
+  /// gains enough.
+  FittedMachine climbed(const std::vector<Contender>& contenders, const Contest& first,
+                        std::vector<LadderStep>& ladder) {
+    FittedMachine now = result_.base;
+    evidence_.anchor(now.machine);
+    if (!accept_one(now, contenders, first)) return now;
+    while (going_) {
+      exchange(now);
+      ladder.push_back(step_of(now, ladder.size()));
+      if (now.added.size() + now.released.size() >= options_.max_effects) break;
+      Contest contest(rules_, now);
+      if (!accept_one(now, contest.contenders(), contest)) break;
+    }
+    return now;
+  }
+
+  /// Other ways to begin, where the best one leads to no full explanation: of two effects, the one
+  /// that explains most at first may be neither.
+  std::vector<Contender> alternatives(const std::vector<Contender>& contenders) const {
+    std::vector<Contender> all;
+    for (std::size_t i = 1; i < contenders.size() && all.size() < kAlternatives; ++i)
+      if (contenders[i].released.empty() && contenders[i].gain > kNearLoss * contenders[0].gain)
+        all.push_back(contenders[i]);
+    return all;
   }
 
   /// Adds the best contender that is still worth it when everything has been fitted together.
@@ -243,15 +279,13 @@ class Search {
     return less;
   }
 
-  void tell_rung(const FittedMachine& m) {
-    result_.rung_chi2.push_back(m.held_out);
-    std::string name = m.added.empty() ? "" : candidates_[m.added.back().candidate].name();
-    if (!m.released.empty() && result_.rung_name.size() >= m.added.size()) name = m.released.back();
-    result_.rung_name.push_back(name);
-    std::vector<double> rms;
+  LadderStep step_of(const FittedMachine& m, std::size_t before) const {
+    LadderStep r{
+        m.added.empty() ? "" : candidates_[m.added.back().candidate].name(), m.held_out, {}};
+    if (!m.released.empty() && before >= m.added.size()) r.name = m.released.back();
     for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
-      rms.push_back(evidence_.rms(m.prediction, c, Role::held_out));
-    result_.rung_rms.push_back(std::move(rms));
+      r.rms.push_back(evidence_.rms(m.prediction, c, Role::held_out));
+    return r;
   }
 
   Evidence& evidence_;

@@ -7,6 +7,7 @@
 //     accept                 the one with the largest gain on held-out laps, if it is enough
 //     converge, drop test    all together; what is no longer needed goes
 //     exchange               each one taken out, all candidates compete for its place
+//   begin otherwise          where much is left: with another of the first contenders
 //
 // A gain is chi-square on held-out laps (whose expectation is their number of samples when nothing
 // but noise is left) and of the priors of the declared numbers. It must exceed 25 and 2 % of the
@@ -39,12 +40,17 @@ struct DiagnosisProgress {
 /// Called now and then; false stops the work, what was found is kept.
 using KeepGoing = std::function<bool(const DiagnosisProgress&)>;
 
+/// What is left after an addition.
+struct LadderStep {
+  std::string name;
+  double held_out = 0;      ///< chi-square
+  std::vector<double> rms;  ///< held-out, per channel [SI]
+};
+
 struct SelectionResult {
   FittedMachine base, found;
-  double floor = 0;               ///< what noise leaves of held-out chi-square
-  std::vector<double> rung_chi2;  ///< held-out chi-square after each addition
-  std::vector<std::string> rung_name;
-  std::vector<std::vector<double>> rung_rms;  ///< held-out, per channel
+  double floor = 0;                ///< what noise leaves of held-out chi-square
+  std::vector<LadderStep> ladder;  ///< one per addition
   std::vector<TrialColumns> trials;
   std::vector<double> release_limits;  ///< of the nuisances of `base`
   bool interrupted = false;
