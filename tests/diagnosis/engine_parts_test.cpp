@@ -109,7 +109,7 @@ TEST(RoleGrams, StepsLeaveWhatTheyLeaveOfTheColumnsThemselves) {
     for (Eigen::Index k = 0; k < n; ++k)
       for (Eigen::Index j = 0; j < 3; ++j)
         m(k, j) = gaussian_noise(9, c, static_cast<std::size_t>(3 * k + j))[0];
-    a.held_out_of[c] = m.leftCols(2).transpose() * m.leftCols(2);
+    a.held_out_of[c] = a.fitted_of[c] = m.leftCols(2).transpose() * m.leftCols(2);
     across.held_out_of[c] = (m.transpose() * m).eval().block(0, 2, 2, 1);
     b.held_out_of[c](0, 0) = m.col(2).squaredNorm();
     a.held_out += a.held_out_of[c], across.held_out += across.held_out_of[c];
@@ -121,6 +121,38 @@ TEST(RoleGrams, StepsLeaveWhatTheyLeaveOfTheColumnsThemselves) {
   const std::vector<double> of = left_after(all.held_out_of, step);
   EXPECT_NEAR(of[0], left[0], 1e-9);
   EXPECT_NEAR(of[1], left[1], 1e-9);
+  const std::vector<double> weight{0.5, 2};
+  EXPECT_NEAR((a.fitted_with(weight) - 0.5 * a.fitted_of[0] - 2 * a.fitted_of[1]).norm(), 0, 1e-9);
+}
+
+TEST(LinearStep, TakesNoDeclaredNumberFurtherThanItIsBelievedToBe) {
+  // z = 100 c1 + 3 c2 with unit columns at right angles: the declared number would go to 50.
+  Eigen::MatrixXd g = Eigen::MatrixXd::Zero(3, 3);
+  g << 100 * 100 + 9, 100, 3, 100, 1, 0, 3, 0, 1;
+  const Eigen::Vector2d precision(1, 0), offset(0, 0);
+  const LinearStep s = linear_step(g, g, precision, offset);
+  EXPECT_NEAR(s.step[0], kFarthestPull, 1e-6);
+  EXPECT_NEAR(s.step[1], 3, 1e-6);
+  EXPECT_NEAR(s.fitted, std::pow(100 - kFarthestPull, 2) + kFarthestPull * kFarthestPull, 1e-3);
+  // Within its tolerances it goes where it always went.
+  g(0, 0) = 16 + 9, g(0, 1) = g(1, 0) = 4;
+  EXPECT_NEAR(linear_step(g, g, precision, offset).step[0], 2, 1e-6);
+}
+
+TEST(NoiseAudit, CountsWhatEncodersRoundOffThoughItRepeats) {
+  Record record = toy::commands(2048, 4);
+  std::vector<double> noise(record.samples()), rounding(record.samples());
+  for (std::size_t k = 0; k < noise.size(); ++k) {
+    noise[k] = 30e-9 * gaussian_noise(3, 0, k)[0];
+    rounding[k] = 40e-9 * gaussian_noise(4, 0, k % 2048)[0];  // the same in every lap
+  }
+  const std::vector<ComparedChannel> channels{{SignalKind::position, 0}};
+  const auto rms = [&](const std::vector<std::vector<double>>& also) {
+    return audit_noise(record, partition(record), channels, {noise}, also).channels[0];
+  };
+  EXPECT_NEAR(rms({}).rms, 30e-9, 1e-9);
+  EXPECT_NEAR(rms({rounding}).rms, 50e-9, 1e-9);
+  EXPECT_NEAR(rms({rounding}).filter.scale, 50e-9, 2e-9);
 }
 
 TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {

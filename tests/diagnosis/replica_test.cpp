@@ -113,6 +113,32 @@ TEST(MachineReplica, ChanceIsNotPredicted) {
   EXPECT_TRUE(same_bits(replica.predict(noisy), replica.predict(run.declared)));
 }
 
+TEST(MachineReplica, WhatEncodersRoundOffIsToldAsNoise) {
+  const RecordedRun& run = reversals();
+  const MachineReplica replica = run.replica();
+  EXPECT_TRUE(replica.rounding(run.declared).empty());
+  Machine coarse = run.declared;
+  coarse.effects.axis[kX].get<EncoderQuantisation>().quantum = 0.1e-6;
+  EXPECT_TRUE(same_bits(replica.predict(coarse), replica.predict(run.declared)));
+  const std::vector<std::vector<double>> rounding = replica.rounding(coarse);
+  ASSERT_EQ(rounding.size(), replica.channels().size());
+  for (std::size_t c = 0; c < rounding.size(); ++c) {
+    const ComparedChannel& channel = replica.channels()[c];
+    if (channel.kind != SignalKind::position) continue;
+    double sum = 0, n = 0;
+    for (const double x : rounding[c])
+      if (std::isfinite(x)) sum += x * x, n += 1;
+    const double rms = std::sqrt(sum / n), even = 0.1e-6 / std::sqrt(12.0);
+    if (channel.axis == kX) {
+      // The control moves the axis about as well: between once and twice an even rounding.
+      EXPECT_GT(rms, 0.7 * even);
+      EXPECT_LT(rms, 2 * even);
+    } else {
+      EXPECT_EQ(rms, 0);
+    }
+  }
+}
+
 /// The controllers keep what is declared, the bodies are as given.
 TEST(MachineReplica, AnotherDeclaredNumberIsADeviation) {
   const RecordedRun& run = reversals();

@@ -143,7 +143,7 @@ TEST(FitDeclared, LeavesNoMoreThanTheDeclarationWhateverIsWrong) {
     const FittedMachine fitted = fit_declared(evidence, declared);
     EXPECT_LE(evidence.chi2(fitted.residual, Role::fitted), before) << wrong;
     for (const FreedNumber& n : fitted.nuisances.numbers)
-      EXPECT_LE(std::abs(n.pull()), 20 + 1e-9) << n.number.key;
+      EXPECT_LE(std::abs(n.pull()), kFarthestPull + 1e-9) << n.number.key;
   }
 }
 
