@@ -87,19 +87,37 @@ std::string effect_box(const FoundEffect& e) {
   return text + "</div>\n";
 }
 
+std::string figure_row(const SignalFigure& f) {
+  const ShownUnit unit = shown_unit(f.channel);
+  return fmt::format(
+      "<tr><td>{}</td><td>{}</td><td>{:.4g}</td><td{}>{:.4g}</td><td>{}</td><td>{}</td></tr>\n",
+      channel_name(f.channel), escaped(f.run), f.before * unit.factor,
+      f.after < 0.95 * f.before ? " class=\"better\"" : "", f.after * unit.factor,
+      f.floor > 0 ? fmt::format("{:.4g}", f.floor * unit.factor) : "–", unit.name);
+}
+
 std::string figures_section(const std::vector<SignalFigure>& figures) {
-  std::string text =
+  constexpr const char* head =
       "<table><tr><th>signal</th><th>run</th><th>before</th><th>after</th><th>noise</th>"
       "<th>unit</th></tr>\n";
+  std::string changed, same;
+  std::size_t unchanged = 0;
   for (const SignalFigure& f : figures) {
-    const ShownUnit unit = shown_unit(f.channel);
-    text += fmt::format(
-        "<tr><td>{}</td><td>{}</td><td>{:.4g}</td><td{}>{:.4g}</td><td>{}</td><td>{}</td></tr>\n",
-        channel_name(f.channel), escaped(f.run), f.before * unit.factor,
-        f.after < 0.95 * f.before ? " class=\"better\"" : "", f.after * unit.factor,
-        f.floor > 0 ? fmt::format("{:.4g}", f.floor * unit.factor) : "–", unit.name);
+    // Of a signal that is not there, rounding is all that is left.
+    if (std::max(f.before, f.after) < 1e-3 * f.floor) continue;
+    const bool moved = std::abs(f.after - f.before) > 0.05 * f.before;
+    (moved ? changed : same) += figure_row(f);
+    unchanged += !moved;
   }
-  return text + "</table>\n";
+  std::string text = changed.empty() ? "" : head + changed + "</table>\n";
+  if (unchanged > 0)
+    text += fmt::format(
+        "<details{}><summary>{} within 5 % of what {} before</summary>\n{}{}"
+        "</table></details>\n",
+        changed.empty() ? " open" : "",
+        unchanged == 1 ? "one row" : fmt::format("{} rows", unchanged),
+        unchanged == 1 ? "it was" : "they were", head, same);
+  return text;
 }
 
 double energy(const std::vector<double>& value) {
