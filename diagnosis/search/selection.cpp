@@ -14,7 +14,8 @@ namespace {
 
 constexpr double kClearLoss = 4;      ///< times the least gain: no need to look closer
 constexpr std::size_t kAttempts = 3;  ///< contenders that are fitted together with all else
-constexpr std::size_t kAlternatives = 2;
+constexpr std::size_t kAlternatives = 1;
+constexpr double kMostLeft = 0.1;  ///< part of what was to be explained
 constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
 
 class Search {
@@ -77,10 +78,12 @@ class Search {
     return now;
   }
 
-  /// Other ways to begin, where the best one leads to no full explanation: of two effects, the one
+  /// Other ways to begin, where the best one explains most but not all: of two effects, the one
   /// that explains most at first may be neither.
   std::vector<Contender> alternatives(const std::vector<Contender>& contenders) const {
     std::vector<Contender> all;
+    if (rules_.excess(result_.found.held_out) > kMostLeft * rules_.excess(result_.base.held_out))
+      return all;
     for (std::size_t i = 1; i < contenders.size() && all.size() < kAlternatives; ++i)
       if (contenders[i].released.empty() && contenders[i].gain > kNearLoss * contenders[0].gain)
         all.push_back(contenders[i]);
