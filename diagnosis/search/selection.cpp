@@ -12,10 +12,10 @@
 namespace vcnc {
 namespace {
 
-constexpr double kClearLoss = 4;      ///< times the least gain: no need to look closer
-constexpr std::size_t kAttempts = 3;  ///< contenders that are fitted together with all else
-constexpr std::size_t kAlternatives = 1;
-constexpr double kMostLeft = 0.1;  ///< part of what was to be explained
+constexpr double kClearLoss = 4;          ///< times the least gain: no need to look closer
+constexpr std::size_t kAttempts = 3;      ///< contenders that are fitted together with all else
+constexpr std::size_t kAlternatives = 1;  ///< other beginnings
+constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to look for another one
 constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
 
 class Search {
