@@ -293,6 +293,10 @@ class Report {
       e.name = candidate.effect;
       e.place = candidate.place;
       for (const FreedNumber& n : a.numbers) e.numbers.push_back(fitted(n));
+      for (const FreeNumber& n : candidate.numbers) {
+        const double value = number_of(found().machine, n.key);
+        if (n.whole) e.numbers.push_back({n.key, value, value, value});
+      }
       e.gain = a.gain;
       Machine without = found().machine;
       for (const FreeNumber& n : candidate.numbers)

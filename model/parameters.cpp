@@ -12,7 +12,8 @@ namespace {
 /// A visitor of fields() that keeps every number.
 class Collector {
  public:
-  explicit Collector(std::vector<Parameter>& all) : all_(all) {}
+  Collector(std::vector<Parameter>& all, std::vector<WholeParameter>& whole)
+      : all_(all), whole_(whole) {}
 
   void operator()(std::string_view key, double& v, Unit u, Range r, const char*) {
     all_.push_back({path_ + std::string(key), &v, u, r});
@@ -23,7 +24,9 @@ class Collector {
   }
   void operator()(std::string_view, std::vector<double>&, Unit, Range, const char*) {}
   void operator()(std::string_view, std::vector<Vec3>&, Unit, Range, const char*) {}
-  void operator()(std::string_view, int&, Range, const char*) {}
+  void operator()(std::string_view key, int& v, Range r, const char*) {
+    whole_.push_back({path_ + std::string(key), &v, r});
+  }
   void operator()(std::string_view, bool&, const char*) {}
   void operator()(std::string_view, std::string&, const char*) {}
   template <class Enum>
@@ -49,6 +52,7 @@ class Collector {
 
  private:
   std::vector<Parameter>& all_;
+  std::vector<WholeParameter>& whole_;
   std::string path_;
 };
 
@@ -56,9 +60,18 @@ class Collector {
 
 std::vector<Parameter> parameters(Machine& machine) {
   std::vector<Parameter> all;
-  Collector collector(all);
+  std::vector<WholeParameter> whole;
+  Collector collector(all, whole);
   Machine::fields(machine, collector);
   return all;
+}
+
+std::vector<WholeParameter> whole_parameters(Machine& machine) {
+  std::vector<Parameter> all;
+  std::vector<WholeParameter> whole;
+  Collector collector(all, whole);
+  Machine::fields(machine, collector);
+  return whole;
 }
 
 void set_parameter(Machine& machine, const std::string& key, double value) {

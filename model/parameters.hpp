@@ -23,6 +23,14 @@ struct Parameter {
 /// The numbers of `machine`, which must outlive the result and not be moved.
 std::vector<Parameter> parameters(Machine& machine);
 
+/// A whole number: waves per turn, lobes.
+struct WholeParameter {
+  std::string key;
+  int* value;
+  Range range;
+};
+std::vector<WholeParameter> whole_parameters(Machine& machine);
+
 /// Sets one number, given in the unit of its key. Throws std::invalid_argument for an unknown key
 /// or a value out of range, with what is allowed.
 void set_parameter(Machine& machine, const std::string& key, double value);

@@ -42,6 +42,20 @@ CommandedMotion at_cycles(const CommandedMotion& motion, double period) {
   return result;
 }
 
+/// What was recorded, at 1 ms by straight lines.
+std::vector<double> at_cycles(const std::vector<double>& value, double period, std::size_t cycles) {
+  std::vector<double> result(cycles, kMissing);
+  for (std::size_t k = 0; k < cycles; ++k) {
+    const double at = static_cast<double>(k) * kCycleTime / period;
+    const auto i = static_cast<std::size_t>(at + 1e-9);
+    const double part = std::max(0.0, at - static_cast<double>(i));
+    if (i >= value.size()) break;
+    result[k] = i + 1 < value.size() && part > 1e-9 ? value[i] + part * (value[i + 1] - value[i])
+                                                    : value[i];
+  }
+  return result;
+}
+
 std::vector<ComparedChannel> channels_of(const Record& record, const CommandedMotion& motion) {
   std::vector<ComparedChannel> channels;
   for (const MeasuredSignal& signal : record.signals) {
@@ -114,8 +128,9 @@ struct MachineReplica::Anchor {
   NearbyPoses poses;
   bool needs_full = false;
   ProbeReplay full;
-  Deflections ball_offset;     ///< full less quick
-  Deflections reading_offset;  ///< the same, both of the full ball
+  Deflections ball_offset;     ///< full less quick, and off_record()
+  Deflections reading_offset;  ///< full less quick, both of the full ball, less off_record()
+  Deflections reading;         ///< of the anchor
 };
 
 MachineReplica::MachineReplica(const Record& record, const Machine& declared,
@@ -128,6 +143,9 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
                         [](const ComparedChannel& c) { return c.kind == SignalKind::deflection; });
   known_ = motion.known;
   motion_ = at_cycles(motion, period_);
+  for (std::size_t c = 0; c < measured_.size(); ++c)
+    if (const MeasuredSignal* signal = record.find(SignalKind::deflection, c))
+      measured_[c] = at_cycles(signal->value, period_, motion_.known.size());
   if (piece) piece_ = make_piece(*piece);
   for (auto& memory : axis_memory_) memory = std::make_unique<Memory<AxisReplay>>(kAxisReplays);
   for (auto& memory : watched_) memory = std::make_unique<Memory<WatchedReplay>>(kWatched);
@@ -212,20 +230,49 @@ void MachineReplica::anchor(const Machine& machine) {
   anchor->full = replay_probe(h.actual, piece_.get(), axes);
   const Deflections quick = replay_contact(
       h.actual, piece_.get(), {anchor->poses, anchor->poses.poses(), anchor->poses.axes()});
-  anchor->ball_offset = sum(anchor->full.ball, quick, -1);
+  const Deflections off = off_record(anchor->full.reading), &ball = anchor->full.ball;
+  anchor->ball_offset = sum(sum(ball, quick, -1), off, 1);
   anchor->reading_offset =
-      sum(anchor->full.reading, replay_sensing(h.actual, anchor->full.ball, axes), -1);
+      sum(sum(anchor->full.reading, replay_sensing(h.actual, ball, axes), -1), off, -1);
+  anchor->reading = anchor->needs_full ? anchor->full.reading
+                                       : sum(replay_sensing(h.actual, sum(ball, off, 1), axes),
+                                             anchor->reading_offset, 1);
   anchor_ = std::move(anchor);
   pose_memory_->clear();  // they hold what was seen from another anchor
   ball_memory_->clear();
 }
 
 Deflections MachineReplica::reading_of(const Hypothesis& h, const AxisReplays& axes) const {
-  if (h.ball == anchor_->ball && h.sensing == anchor_->sensing) return anchor_->full.reading;
+  if (h.ball == anchor_->ball && h.sensing == anchor_->sensing) return anchor_->reading;
   if (anchor_->needs_full || needs_full_probe(h.actual))
     return replay_probe(h.actual, piece_.get(), axes).reading;
   const Deflections ball = sum(*ball_of(h, axes), anchor_->ball_offset, 1);
   return sum(replay_sensing(h.actual, ball, axes), anchor_->reading_offset, 1);
+}
+
+/// What was measured less `reading`, as a moving mean, a period of the signals at most.
+Deflections MachineReplica::off_record(const Deflections& reading) const {
+  constexpr std::size_t kReach = 10;  // cycles
+  const double most = declared_.probe.signal_period;
+  Deflections off;
+  for (std::size_t c = 0; c < off.size(); ++c) {
+    const std::size_t n = reading[c].size();
+    off[c].assign(n, 0.0);
+    if (measured_[c].size() != n) continue;
+    std::vector<double> sum(n + 1, 0.0), count(n + 1, 0.0);
+    for (std::size_t k = 0; k < n; ++k) {
+      const double d = measured_[c][k] - reading[c][k];
+      const bool known = std::isfinite(d);
+      sum[k + 1] = sum[k] + (known ? d : 0);
+      count[k + 1] = count[k] + (known ? 1 : 0);
+    }
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::size_t first = k > kReach ? k - kReach : 0, last = std::min(n, k + kReach + 1);
+      const double known = count[last] - count[first];
+      if (known > 0) off[c][k] = std::clamp((sum[last] - sum[first]) / known, -most, most);
+    }
+  }
+  return off;
 }
 
 /// Values at the record's samples of what is known at every cycle.

@@ -20,6 +20,11 @@
 // value = full(anchor) + quick(machine) - quick(anchor). Poses are those on the anchor's axes,
 // moved along with the axes to first order. So it is exact at the anchor, and the nearer the
 // better. What cannot be had quickly is computed in full.
+//
+// Errors of the signals repeat with every few micrometres of deflection, and where the ball is, the
+// model may not know to one. They are therefore taken where the record says it was: quick(x) above
+// is of the ball moved by d, less d, where d is what the record is off the anchor's reading, as a
+// moving mean of 21 ms.
 #pragma once
 
 #include <map>
@@ -76,6 +81,7 @@ class MachineReplica : public Replica {
   void sample_as_recorded(AxisReplay& replay) const;
   Prediction predict(const Hypothesis& hypothesis, const AxisReplays& axes) const;
   Prediction assembled(const AxisReplays& axes, const Deflections& reading) const;
+  Deflections off_record(const Deflections& reading) const;
   std::vector<double> as_recorded(const std::vector<double>& per_cycle) const;
 
   Machine declared_;
@@ -85,6 +91,7 @@ class MachineReplica : public Replica {
   bool probes_ = false;      ///< some channel is a deflection
   CommandedMotion motion_;   ///< at 1 ms
   std::vector<char> known_;  ///< at the record's rate
+  Deflections measured_;     ///< at 1 ms; empty where not recorded
   std::unique_ptr<Piece> piece_;
   PerAxis<std::unique_ptr<Memory<AxisReplay>>> axis_memory_;
   PerAxis<std::unique_ptr<Memory<WatchedReplay>>> watched_;

@@ -6,8 +6,7 @@
 //
 // - effects that no prediction can show, with the reason: no_hypothesis() in effect_stage.hpp;
 // - wind-up and backlash of an axis whose motor side is next to nothing: there are no two masses;
-// - whole numbers (lobes, harmonics, poles per turn), which stay as the library has them, and so
-//   effects that have nothing but those: bus latency, which a command delay describes as well, and
+// - effects of nothing but whole numbers: bus latency, which a command delay describes as well, and
 //   the slip of a period, which is sought by itself (period_slip_search.hpp);
 // - declared numbers that an effect stands for: gains, feed-forwards, force limit, torque constant,
 //   ball radius, positions of the rotary axes, of the piece and of the probe.
@@ -26,6 +25,7 @@ struct FreeNumber {
   double typical = 0;  ///< a size at which it shows, in the unit of the key
   double min = 0, max = 0;
   bool one_sided = false;  ///< its null value is at a bound
+  bool whole = false;      ///< lobes, waves per turn: tried at several values, never fitted
 };
 
 struct Candidate {

@@ -53,8 +53,7 @@ void add_candidate(const EffectPlace& place, std::vector<Candidate>& all) {
   const std::vector<EffectNumber> at_nominal = numbers_of(nominal, place.rotary);
   std::vector<Component> components;
   for (std::size_t i = 0; i < at_nominal.size(); ++i)
-    for (int k = 0; k < at_nominal[i].size() && !at_nominal[i].whole(); ++k)
-      components.push_back({i, k});
+    for (int k = 0; k < at_nominal[i].size(); ++k) components.push_back({i, k});
   const std::vector<double> sizes = typical_sizes(at_nominal, components);
 
   Candidate candidate{
@@ -68,14 +67,15 @@ void add_candidate(const EffectPlace& place, std::vector<Candidate>& all) {
     // An amplitude makes an effect of nothing; anything else only shapes one.
     Effect alone;
     numbers_of(alone, place.rotary)[components[c].number].set(components[c].index, sizes[c]);
-    const bool amplitude = !alone.null();
+    const bool amplitude = !number.whole() && !alone.null();
     acts = acts || amplitude;
     if (!amplitude) candidate.shape.push_back(candidate.numbers.size());
     const double at_null =
         in_unit(numbers_of(null, place.rotary)[components[c].number], components[c].index);
     candidate.numbers.push_back(
         {std::move(key), sizes[c], number.range.min, number.range.max,
-         amplitude && (at_null <= number.range.min || at_null >= number.range.max)});
+         amplitude && (at_null <= number.range.min || at_null >= number.range.max),
+         number.whole()});
   }
   if (acts) all.push_back(std::move(candidate));
 }

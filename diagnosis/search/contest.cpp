@@ -6,6 +6,7 @@
 #include <iterator>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include "diagnosis/search/parallel.hpp"
 
@@ -16,6 +17,8 @@ constexpr int kGlance = 4;        ///< iterations to see what a candidate is wor
 constexpr double kUsual = 1;      ///< decades about the typical size
 constexpr double kPromise = 0.3;  ///< of what is needed: worth a refit
 constexpr double kBothLaps = 2;   ///< gain on held-out laps per gain on fitted ones, at most
+constexpr double kLeaves = 0.05;  ///< part of what is left that a winner may leave
+constexpr std::size_t kElsewhere = 2;
 constexpr std::size_t kFinalists = 3, kRivals = 4, kMoreRefits = 8;
 
 void sort_by_worth(std::vector<Contender>& all) {
@@ -42,7 +45,10 @@ Contest::Contest(const ContestRules& rules, const FittedMachine& now)
                       ground_.held_out_of)) {}
 
 std::vector<Contender> Contest::contenders() {
-  const std::vector<Screened> all_screened = screened(), list = shortlist(all_screened);
+  const std::vector<Screened> all_trials = screen(rules_.evidence, ground_, doubt_,
+                                                  rules_.candidates, rules_.trials),
+                              all_screened = best_of_each(all_trials),
+                              list = shortlist(all_screened);
   std::vector<Contender> all = refitted(list);
   finish(all);
   if (const std::vector<Screened> more = likes_of(all, all_screened, list); !more.empty()) {
@@ -59,13 +65,15 @@ std::vector<Contender> Contest::contenders() {
   });
   sort_by_worth(all);
   put_simplest_first(all);
+  if (!all.empty()) begin_elsewhere(all.front(), all_trials);
   if (all.empty() || all.front().gain < 0.5 * rules_.excess(ground_.held_out))
     look_ahead(all_screened, all);
   return all;
 }
 
 std::vector<Contender> Contest::rivals(double least, std::size_t but) const {
-  std::vector<Screened> list = screened();
+  std::vector<Screened> list =
+      best_of_each(screen(rules_.evidence, ground_, doubt_, rules_.candidates, rules_.trials));
   std::erase_if(list, [&](const Screened& s) { return s.gain < least || candidate_of(s) == but; });
   if (list.size() > kRivals) list.resize(kRivals);
   std::vector<Contender> all = refitted(list);
@@ -90,15 +98,14 @@ std::size_t Contest::candidate_of(const Screened& s) const {
   return rules_.trials[s.trial].trial.candidate;
 }
 
-/// All but what is found already, best first.
-std::vector<Screened> Contest::screened() const {
-  std::vector<Screened> all =
-      screen(rules_.evidence, ground_, doubt_, rules_.candidates, rules_.trials);
-  std::erase_if(all, [&](const Screened& s) {
-    return std::any_of(now_.added.begin(), now_.added.end(),
-                       [&](const AddedEffect& a) { return a.candidate == candidate_of(s); });
-  });
-  return all;
+/// The best trial of every candidate but of what is found already, best first.
+std::vector<Screened> Contest::best_of_each(const std::vector<Screened>& trials) const {
+  std::vector<Screened> best;
+  std::vector<char> seen(rules_.candidates.size(), false);
+  for (const AddedEffect& a : now_.added) seen[a.candidate] = true;
+  for (const Screened& s : trials)
+    if (!std::exchange(seen[candidate_of(s)], true)) best.push_back(s);
+  return best;
 }
 
 /// Screened candidates worth a refit.
@@ -192,18 +199,21 @@ Contender Contest::contender(const std::vector<std::size_t>& trials, const Eigen
   // linear and disappoint.
   for (const double share : {1.0, 0.3}) {
     Contender c;
+    c.begun = now_.machine;
     Eigen::Index at = 0;
     for (const std::size_t t : trials) {
       const Trial& trial = rules_.trials[t].trial;
       const auto width = static_cast<Eigen::Index>(trial.directions.size());
       const std::vector<FreedNumber> numbers =
           start_of(rules_.candidates[trial.candidate], trial,
-                   Eigen::VectorXd(share * size.segment(at, width)));
+                   Eigen::VectorXd(share * size.segment(at, width)),
+                   Eigen::VectorXd(rules_.trials[t].own.fitted.diagonal().cwiseSqrt()));
       c.numbers.insert(c.numbers.end(), numbers.begin(), numbers.end());
+      set_whole_numbers(c.begun, rules_.candidates[trial.candidate], trial);
       at += width;
     }
     c.candidate = rules_.trials[trials.front()].trial.candidate;
-    c.fit = refit(rules_.evidence, now_.machine, c.numbers, without(linear_, c.numbers), kGlance);
+    c.fit = refit(rules_.evidence, c.begun, c.numbers, without(linear_, c.numbers), kGlance);
     c.numbers = c.fit.live;
     c.gain = gain_of(c.fit.fitted, c.fit.held_out);
     const bool first = share == 1.0;
@@ -226,10 +236,28 @@ void Contest::finish(std::vector<Contender>& all) const {
     Contender& c = all[i];
     if (c.converged || !rules_.go("refitting the best", 0)) return;
     c.converged = true;
-    c.fit = refit(rules_.evidence, now_.machine, c.numbers, without(linear_, c.numbers));
+    c.fit = refit(rules_.evidence, c.begun, c.numbers, without(linear_, c.numbers));
     c.numbers = c.fit.live;
     c.gain = gain_of(c.fit.fitted, c.fit.held_out);
   });
+}
+
+/// A law that leaves something may fit better from another of its shapes: the next best trials of
+/// the winner are refitted as well.
+void Contest::begin_elsewhere(Contender& best, const std::vector<Screened>& trials) const {
+  if (!best.released.empty() ||
+      rules_.excess(ground_.held_out - best.gain) < kLeaves * rules_.excess(ground_.held_out))
+    return;
+  std::vector<Contender> others;
+  std::size_t tried = 0;
+  for (const Screened& s : trials) {
+    if (candidate_of(s) != best.candidate || tried++ == 0) continue;  // it began at the first
+    if (others.size() == kElsewhere || !rules_.go("trying other shapes", 0)) break;
+    others.push_back(contender({s.trial}, s.size, s.gain));
+  }
+  finish(others);
+  for (Contender& c : others)
+    if (c.fit.fitted < best.fit.fitted && c.gain > best.gain) best = std::move(c);
 }
 
 /// A declared number whose tolerance is lifted competes with the effects.

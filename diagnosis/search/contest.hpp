@@ -20,6 +20,7 @@ namespace vcnc {
 /// What a candidate came to.
 struct Contender {
   std::size_t candidate = 0;
+  Machine begun;  ///< what is refitted: the machine so far, with the whole numbers of the trials
   std::vector<FreedNumber> numbers;
   Refit fit;
   double gain = 0;
@@ -60,7 +61,7 @@ class Contest {
   double held_out() const { return ground_.held_out; }
 
  private:
-  std::vector<Screened> screened() const;
+  std::vector<Screened> best_of_each(const std::vector<Screened>& trials) const;
   std::vector<Screened> shortlist(const std::vector<Screened>& screened) const;
   std::vector<Screened> likes_of(const std::vector<Contender>& all,
                                  const std::vector<Screened>& screened,
@@ -70,6 +71,7 @@ class Contest {
   Contender contender(const std::vector<std::size_t>& trials, const Eigen::VectorXd& size,
                       double promised) const;
   void finish(std::vector<Contender>& all) const;
+  void begin_elsewhere(Contender& best, const std::vector<Screened>& trials) const;
   std::vector<Contender> releases() const;
   void look_ahead(const std::vector<Screened>& screened, std::vector<Contender>& all) const;
   void put_simplest_first(std::vector<Contender>& all) const;

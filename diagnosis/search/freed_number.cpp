@@ -56,6 +56,8 @@ double number_of(const Machine& machine, const std::string& key) {
   Machine copy = machine;
   for (const Parameter& p : parameters(copy))
     if (p.key == key) return p.in_unit();
+  for (const WholeParameter& p : whole_parameters(copy))
+    if (p.key == key) return *p.value;
   throw std::invalid_argument(key + ": is not a number of a machine file");
 }
 
@@ -63,6 +65,11 @@ void move_number(Machine& machine, const std::string& key, double value) {
   for (const Parameter& p : parameters(machine)) {
     if (p.key != key) continue;
     *p.value = std::clamp(value, p.range.min, p.range.max) * p.unit.to_si;
+    return;
+  }
+  for (const WholeParameter& p : whole_parameters(machine)) {
+    if (p.key != key) continue;
+    *p.value = static_cast<int>(std::lround(std::clamp(value, p.range.min, p.range.max)));
     return;
   }
   throw std::invalid_argument(key + ": is not a number of a machine file");

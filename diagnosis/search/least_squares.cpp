@@ -73,7 +73,8 @@ LeastSquaresSolution solve(const LeastSquaresProblem& problem) {
   options.function_tolerance = problem.cost_tolerance;
   options.parameter_tolerance = 1e-7;
   options.gradient_tolerance = 1e-12;
-  options.initial_trust_region_radius = 1e6;  // the columns are scaled, so start as Gauss-Newton
+  // Of columns scaled to one: start as Gauss-Newton, or half as far.
+  options.initial_trust_region_radius = problem.cautious ? 1 : 1e6;
   options.logging_type = ceres::SILENT;
   options.num_threads = 1;
   ceres::Solver::Summary summary;

@@ -22,6 +22,7 @@ struct Linearisation {
 struct LeastSquaresProblem {
   Eigen::VectorXd start, min, max;
   std::function<Linearisation(const Eigen::VectorXd& x, bool with_derivatives)> evaluate;
+  bool cautious = false;  ///< begins with short steps: far from linear
   int max_iterations = 12;
   double cost_tolerance = 1e-5;  ///< relative change of the cost at which it is content
 };

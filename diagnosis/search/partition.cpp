@@ -40,7 +40,7 @@ Partition partition(const Record& record) {
 
   const auto second =
       static_cast<std::size_t>(std::max(1.0, std::round(1 / std::max(record.period, 1e-9))));
-  std::map<int, int> seen;
+  std::map<int, int> seen, first;  // laps of a condition so far; the one of them that is held out
   int singles = 0;
   for (std::size_t i = 0; i < p.stretches.size(); ++i) {
     const Stretch& s = p.stretches[i];
@@ -48,9 +48,11 @@ Partition partition(const Record& record) {
     const std::size_t pieces = std::max<std::size_t>(1, (length + second / 2) / second);
     const bool once = p.repeated && repetitions[s.condition] == 1;
     const int lap = seen[s.condition]++;
+    const int of =
+        first.try_emplace(s.condition, 1 - static_cast<int>(first.size()) % 2).first->second;
     for (std::size_t k = 0; k < pieces; ++k) {
       // What was run once is held out in pieces.
-      const bool held_out = once ? singles++ % 2 == 1 : lap % 2 == 1;
+      const bool held_out = once ? singles++ % 2 == 1 : lap % 2 == of;
       p.blocks.push_back({s.begin + length * k / pieces, s.begin + length * (k + 1) / pieces, i,
                           s.condition, held_out});
     }

@@ -1,8 +1,9 @@
 // What of a record is fitted and what is held out.
 //
 // Effects are chosen and judged on data they were not fitted to. Of every condition every other
-// repetition is held out; a record without repetitions is cut into pieces which are fitted and held
-// out in turn. Conditions, not samples, are the unit of evidence: see selection.hpp.
+// repetition is held out, by turns the early and the late ones, so that what changes with time is
+// seen by both; a record without repetitions is cut into pieces which are fitted and held out in
+// turn. Conditions, not samples, are the unit of evidence: see selection.hpp.
 #pragma once
 
 #include <cstddef>

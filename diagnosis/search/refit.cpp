@@ -225,6 +225,8 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
   LeastSquaresProblem problem;
   problem.start.resize(k), problem.min.resize(k), problem.max.resize(k);
   problem.max_iterations = max_iterations;
+  problem.cautious =
+      std::any_of(live.begin(), live.end(), [](const FreedNumber& n) { return n.shape; });
   for (std::size_t i = 0; i < live.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
     const double unit = live[i].number.typical;

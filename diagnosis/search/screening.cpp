@@ -253,17 +253,10 @@ std::vector<Screened> screen(const Evidence& evidence, const Ground& ground, con
       all[i].gain = g.gain, all[i].counted = g.counted;
     all[i].size = std::move(g.size);
   });
-  std::vector<Screened> best;
-  for (std::size_t c = 0; c < candidates.size(); ++c) {
-    const Screened* of = nullptr;
-    for (const Screened& s : all)
-      if (trials[s.trial].trial.candidate == c && s.size.size() > 0 && (!of || s.gain > of->gain))
-        of = &s;
-    if (of) best.push_back(*of);
-  }
-  std::stable_sort(best.begin(), best.end(),
+  std::erase_if(all, [](const Screened& s) { return s.size.size() == 0; });
+  std::stable_sort(all.begin(), all.end(),
                    [](const Screened& x, const Screened& y) { return x.gain > y.gain; });
-  return best;
+  return all;
 }
 
 Screened screen_pair(const Evidence& evidence, const Ground& ground, const Doubt& doubt,

@@ -88,7 +88,7 @@ void find_detection_limits(const Evidence& evidence, const Ground& ground, const
 std::vector<double> release_limits(const Ground& ground, const std::vector<FreedNumber>& numbers,
                                    double pull, double gain);
 
-/// Gains of all trials on a residual, the best trial of every candidate, best first.
+/// Gains of all trials on a residual, best first.
 std::vector<Screened> screen(const Evidence& evidence, const Ground& ground, const Doubt& doubt,
                              const std::vector<Candidate>& candidates,
                              std::vector<TrialColumns>& trials);

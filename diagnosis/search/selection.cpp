@@ -121,8 +121,8 @@ class Search {
 
   void simulate() {
     if (!going_) return;
-    std::vector<Trial> all =
-        trials(result_.base.machine, candidates_, TrialValuesOf(evidence_, result_.base.residual));
+    std::vector<Trial> all = trials(result_.base.machine, candidates_,
+                                    TrialValuesOf(evidence_, declared_, result_.base.residual));
     // What goes along in every fit is no news: see releases().
     std::erase_if(all, [&](const Trial& t) {
       const std::vector<FreeNumber>& numbers = candidates_[t.candidate].numbers;

@@ -26,6 +26,7 @@ bool contains(const std::string& text, const char* part) {
 }  // namespace
 
 bool is_fixed(const FreeNumber& n) {
+  if (n.whole) return true;
   for (const char* part : {".reference_", ".rest_", ".expansion_", ".channel"})
     if (contains(n.key, part)) return true;
   return false;
@@ -75,11 +76,11 @@ std::vector<Trial> trials(const Machine& base, const std::vector<Candidate>& can
         }
       }
     for (std::size_t i = 0; i < candidate.numbers.size() && !present; ++i) {
-      if (!is_shape(candidate, i) || is_fixed(candidate.numbers[i]) || i == phase) continue;
+      const FreeNumber& n = candidate.numbers[i];
+      if (!is_shape(candidate, i) || (is_fixed(n) && !n.whole) || i == phase) continue;
       std::vector<Trial> wider;
       for (const double value : trial_values(candidate, i)) {
-        const double allowed =
-            std::clamp(value, candidate.numbers[i].min, candidate.numbers[i].max);
+        const double allowed = std::clamp(value, n.min, n.max);
         for (Trial t : grid) {
           t.values[i] = allowed;
           wider.push_back(std::move(t));
@@ -105,26 +106,32 @@ Machine machine_of(const Machine& base, const Candidate& candidate, const Trial&
   return machine;
 }
 
+void set_whole_numbers(Machine& machine, const Candidate& candidate, const Trial& trial) {
+  for (std::size_t i = 0; i < candidate.numbers.size(); ++i)
+    if (candidate.numbers[i].whole) move_number(machine, candidate.numbers[i].key, trial.values[i]);
+}
+
 std::vector<FreedNumber> start_of(const Candidate& candidate, const Trial& trial,
-                                  const Eigen::VectorXd& size) {
+                                  const Eigen::VectorXd& size, const Eigen::VectorXd& worth) {
   std::vector<double> values = trial.values;
   const std::size_t phase = phase_of(candidate);
   const bool two = std::any_of(trial.directions.begin(), trial.directions.end(),
                                [](const Direction& d) { return d.quadrature; });
   double angle = 0, largest = 0;
-  std::vector<double> in(values.size(), 0.0), across(values.size(), 0.0);
+  std::vector<double> in(values.size(), 0.0), across(values.size(), 0.0), does = in;
   for (std::size_t d = 0; d < trial.directions.size(); ++d) {
     const Direction& direction = trial.directions[d];
     const double share = direction.whole ? 1 : size[static_cast<Eigen::Index>(d)];
     const double part = share * direction.step;
     (direction.quadrature ? across : in)[direction.number] = part;
+    const double part_worth = share * worth[static_cast<Eigen::Index>(d)];
+    does[direction.number] = std::hypot(does[direction.number], part_worth);
   }
   if (two) {
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (is_shape(candidate, i) || has_no_phase(candidate.numbers[i])) continue;
-      const double strength = std::hypot(in[i], across[i]) / std::abs(candidate.numbers[i].typical);
-      if (strength <= largest) continue;
-      largest = strength;
+      if (does[i] <= largest) continue;
+      largest = does[i];
       angle = std::atan2(across[i], in[i]);
     }
     values[phase] = angle / kDegree;

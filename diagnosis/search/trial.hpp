@@ -52,9 +52,13 @@ std::vector<Trial> trials(const Machine& base, const std::vector<Candidate>& can
 Machine machine_of(const Machine& base, const Candidate& candidate, const Trial& trial,
                    const Direction& direction);
 
+/// Gives a machine the whole numbers of a trial, which no refit moves.
+void set_whole_numbers(Machine& machine, const Candidate& candidate, const Trial& trial);
+
 /// The numbers that a refit moves, started where the linear solution says: `size` per direction, in
-/// steps. Amplitudes and shapes; phases where there are two directions.
+/// steps. Amplitudes and shapes; phases where there are two directions: that of the amplitude that
+/// does most, by `worth`, what one step of each direction does.
 std::vector<FreedNumber> start_of(const Candidate& candidate, const Trial& trial,
-                                  const Eigen::VectorXd& size);
+                                  const Eigen::VectorXd& size, const Eigen::VectorXd& worth);
 
 }  // namespace vcnc

@@ -46,12 +46,15 @@ double line_power(const std::vector<double>& position, const std::vector<double>
   return (zs * zs * cc - 2 * zs * zc * sc + zc * zc * ss) / det;
 }
 
-TrialValuesOf::TrialValuesOf(const Evidence& evidence, const Column& residual)
+TrialValuesOf::TrialValuesOf(const Evidence& evidence, const Machine& machine,
+                             const Column& residual)
     : evidence_(evidence),
       duration_(static_cast<double>(evidence.record().samples()) * evidence.record().period),
       wavelengths_(kAxisCount),
       jump_(find_jump(residual)),
       ringing_(find_ringing(residual)) {
+  for (const AxisParams& axis : machine.axes)
+    travel_per_turn_.push_back(axis.mechanics.travel_per_turn);
   parallel_for(kAxisCount,
                [&](std::size_t axis) { wavelengths_[axis] = find_wavelengths(axis, residual); });
 }
@@ -185,7 +188,14 @@ std::vector<double> TrialValuesOf::operator()(const Candidate& candidate,
   const auto more = [&](const std::vector<double>& further) {
     values.insert(values.end(), further.begin(), further.end());
   };
-  if (is_limit(n)) {
+  if (n.whole) {
+    // Lobes of a ball, lobes of a bearing; waves per turn as the residual has them.
+    if (contains(n.key, ".lobes")) more({2, 3, 4, 5});
+    if (contains(n.key, ".harmonic")) more({2, 3});
+    if (axis < kAxisCount && contains(n.key, ".order"))
+      for (const double w : wavelengths_[axis])
+        if (const double order = std::round(travel_per_turn_[axis] / w); order >= 1) more({order});
+  } else if (is_limit(n)) {
     const double largest = largest_reading() / si_of_unit(n.key);
     for (const double share : {0.995, 0.97, 0.9, 0.8}) more({share * largest});
   } else if (contains(n.key, "frequency_Hz")) {

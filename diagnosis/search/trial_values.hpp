@@ -22,7 +22,7 @@ namespace vcnc {
 class TrialValuesOf {
  public:
   /// `evidence` must outlive this.
-  TrialValuesOf(const Evidence& evidence, const Column& residual);
+  TrialValuesOf(const Evidence& evidence, const Machine& machine, const Column& residual);
 
   std::vector<double> operator()(const Candidate& candidate, std::size_t number) const;
 
@@ -33,6 +33,7 @@ class TrialValuesOf {
   double largest_reading() const;  ///< of the probe [m]
 
   const Evidence& evidence_;
+  std::vector<double> travel_per_turn_;  ///< per axis, of its motor [m or rad]
   double duration_ = 0;
   std::vector<std::vector<double>> wavelengths_;  ///< per axis [m or rad]
   double jump_ = 0;                               ///< [s]

@@ -4,7 +4,9 @@ Definitions. L of an effect: the detection limit that the diagnosis itself state
 its excitation table. Strata of single effects: weak below 3 L, strong from 3 L on; below L, or where
 the run does not excite the effect at all, silence is the right answer. A name is right when effect
 and place are; a declared number found out of tolerance is right when it belongs to the effect. An attribution
-is an effect that the report does not call minor, of the machine or of the measurement but not of the set-up.
+is an effect that the report names, minor or not, of the machine or of the measurement but not of the set-up. A pair
+or triple is strong when each of its effects is. A number whose true value is nought (no time constant) has no
+relative error.
 """
 
 import math
@@ -49,7 +51,7 @@ def label(e):
 
 def claims(report):
     """Where the piece was clamped is no claim about the machine."""
-    return [e for e in report.get("effects", []) if not e.get("minor", False) and e.get("axis") != "setup"]
+    return [e for e in report.get("effects", []) if e.get("axis") != "setup"]
 
 
 def in_class(effect, found):
@@ -89,6 +91,11 @@ def stem(key):
     return re.sub(r"\.[xyz]$", "", key)
 
 
+def within(true, low, high):
+    """None: without a limit."""
+    return (low is None or low <= true) and (high is None or true <= high)
+
+
 def numbers_of(found):
     return {n["key"]: n for n in found.get("parameters", [])}
 
@@ -125,8 +132,9 @@ def grade(answer, report, seconds):
                         continue
                     # A component that is nearly nothing is held against the largest of its vector.
                     scale = max(abs(v) for k, v in answer["values"].items() if stem(k) == stem(key))
-                    row["errors"].append(abs(number["value"] - true) / max(scale, 1e-12))
-                    row["covered"].append(number["low"] <= true <= number["high"])
+                    if scale > 0:
+                        row["errors"].append(abs(number["value"] - true) / scale)
+                    row["covered"].append(within(true, number["low"], number["high"]))
     if row["kind"] in ("unknown", "without"):
         law = report.get("law") or {}
         row["rejected"] = report["verdict"].startswith(OPEN)
@@ -170,6 +178,7 @@ def summary(rows):
     for kind in ("pair", "triple"):
         some = [r for r in rows if r["kind"] == kind]
         out[f"{kind}: exact set"] = share(r["exact"] for r in some)
+        out[f"{kind}: exact set, each effect strong"] = share(r["exact"] for r in some if r["strength"] >= 3)
         out[f"{kind}: effects found"] = share(flag for r in some for flag in r["right"])
         out[f"{kind}: claims that are true"] = share(
             [True] * sum(sum(r["right"]) for r in some) + [False] * sum(max(0, r["claims"] - sum(r["right"])) for r in some))

@@ -35,11 +35,23 @@ class Grading(unittest.TestCase):
         row = grading.grade(TRUTH, report(found("backlash", "Y")), 1)
         self.assertFalse(row["top"] or row["exact"])
 
-    def test_a_second_claim_spoils_the_set_but_not_a_minor_one(self):
+    def test_a_second_claim_spoils_the_set_a_minor_one_as_well(self):
         two = grading.grade(TRUTH, report(found("backlash", "X"), found("kv_error", "X")), 1)
         self.assertTrue(two["top"] and not two["exact"])
         minor = grading.grade(TRUTH, report(found("backlash", "X"), found("kv_error", "X", minor=True)), 1)
-        self.assertTrue(minor["exact"])
+        self.assertTrue(minor["top"] and not minor["exact"])
+
+    def test_a_true_value_of_nought_has_no_relative_error(self):
+        truth = dict(TRUTH, values={"effects.X.backlash.gap_um": 0.0})
+        row = grading.grade(truth, report(found("backlash", "X", "effects.X.backlash.gap_um", 4.1, 3.9, None)), 1)
+        self.assertEqual((row["errors"], row["covered"]), ([], [False]))
+
+    def test_strong_pairs_are_counted_by_themselves(self):
+        rows = [{"kind": "pair", "exact": e, "strength": s, "right": [e, e], "claims": 2, "seconds": 1, "after_over_floor": 1}
+                for e, s in ((True, 5), (False, 1.5))]
+        of = grading.summary(rows)
+        self.assertEqual(of["pair: exact set"], "1/2 (50.0 %)")
+        self.assertEqual(of["pair: exact set, each effect strong"], "1/1 (100.0 %)")
 
     def test_everything_is_possible_earns_nothing(self):
         row = grading.grade(TRUTH, report(found("backlash", "X", **{"class": ["X.windup"] * 9})), 1)
