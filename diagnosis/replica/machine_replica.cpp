@@ -234,9 +234,10 @@ void MachineReplica::anchor(const Machine& machine) {
   anchor->ball_offset = sum(sum(ball, quick, -1), off, 1);
   anchor->reading_offset =
       sum(sum(anchor->full.reading, replay_sensing(h.actual, ball, axes), -1), off, -1);
-  anchor->reading = anchor->needs_full ? anchor->full.reading
-                                       : sum(replay_sensing(h.actual, sum(ball, off, 1), axes),
-                                             anchor->reading_offset, 1);
+  anchor->reading = signals_err(h.actual) && !anchor->needs_full
+                        ? sum(replay_sensing(h.actual, sum(ball, off, 1), axes),
+                              anchor->reading_offset, 1)
+                        : anchor->full.reading;
   anchor_ = std::move(anchor);
   pose_memory_->clear();  // they hold what was seen from another anchor
   ball_memory_->clear();

@@ -275,10 +275,13 @@ Deflections replay_sensing(const Machine& actual, const Deflections& ball,
   return reading;
 }
 
+bool signals_err(const Machine& actual) {
+  return !machine_chain<AnaloguePort>(actual.effects, kSeed).empty();
+}
+
 bool needs_full_probe(const Machine& actual) {
   return !actual.effects.get<ContactLoss>().null() || !actual.effects.get<ReturnToZero>().null() ||
-         (actual.probe.correction == ProbeParams::Correction::heydemann &&
-          !machine_chain<AnaloguePort>(actual.effects, kSeed).empty());
+         (actual.probe.correction == ProbeParams::Correction::heydemann && signals_err(actual));
 }
 
 bool poses_follow_dynamics(const Machine& actual) {

@@ -97,6 +97,9 @@ Deflections replay_sensing(const Machine& actual, const Deflections& ball, const
 /// online.
 bool needs_full_probe(const Machine& actual);
 
+/// Whether some effect makes errors of the sin/cos signals, which repeat with their period.
+bool signals_err(const Machine& actual);
+
 /// Whether errors of the geometry follow the axes' accelerations, or remember: then those near
 /// other axes are not those of a machine near.
 bool poses_follow_dynamics(const Machine& actual);

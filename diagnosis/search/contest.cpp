@@ -13,13 +13,21 @@
 namespace vcnc {
 namespace {
 
-constexpr int kGlance = 4;        ///< iterations to see what a candidate is worth
-constexpr double kUsual = 1;      ///< decades about the typical size
-constexpr double kPromise = 0.3;  ///< of what is needed: worth a refit
-constexpr double kBothLaps = 2;   ///< gain on held-out laps per gain on fitted ones, at most
-constexpr double kLeaves = 0.05;  ///< part of what is left that a winner may leave
+constexpr int kGlance = 4;         ///< iterations to see what a candidate is worth
+constexpr double kUsual = 1;       ///< decades about the typical size
+constexpr double kShows = 0.02;    ///< part of a gain that a channel must have to be concerned
+constexpr double kNothing = 0.03;  ///< of a typical size
+constexpr double kPromise = 0.3;   ///< of what is needed: worth a refit
+constexpr double kBothLaps = 2;    ///< gain on held-out laps per gain on fitted ones, at most
+constexpr double kLeaves = 0.05;   ///< part of what is left that a winner may leave
 constexpr std::size_t kElsewhere = 2;
 constexpr std::size_t kFinalists = 3, kRivals = 4, kMoreRefits = 8;
+
+/// Where so much is left.
+double threshold_of(const DiagnosisOptions& options, double left) {
+  return std::max({options.least_gain, options.least_share * left,
+                   options.share_of_form * std::min(left, options.form)});
+}
 
 void sort_by_worth(std::vector<Contender>& all) {
   std::stable_sort(all.begin(), all.end(),
@@ -31,9 +39,16 @@ void sort_by_worth(std::vector<Contender>& all) {
 double ContestRules::excess(double held_out) const { return std::max(0.0, held_out - floor); }
 
 double ContestRules::threshold(double held_out) const {
-  const double left = excess(held_out);
-  return std::max({options.least_gain, options.least_share * left,
-                   options.share_of_form * std::min(left, options.form)});
+  return threshold_of(options, excess(held_out));
+}
+
+double ContestRules::threshold(const std::vector<double>& before,
+                               const std::vector<double>& after) const {
+  double gain = 0, left = 0;
+  for (std::size_t c = 0; c < before.size(); ++c) gain += std::max(0.0, before[c] - after[c]);
+  for (std::size_t c = 0; c < before.size(); ++c)
+    if (before[c] - after[c] > kShows * gain) left += std::max(0.0, before[c] - floor_of[c]);
+  return threshold_of(options, left);
 }
 
 Contest::Contest(const ContestRules& rules, const FittedMachine& now)
@@ -57,10 +72,11 @@ std::vector<Contender> Contest::contenders() {
     finish(all);
   }
   for (Contender& c : releases()) all.push_back(std::move(c));
-  const double needed = rules_.threshold(ground_.held_out);
+  for (Contender& c : all)
+    c.needed = c.released.empty() ? rules_.threshold(ground_.held_out_of, c.fit.held_out_of)
+                                  : rules_.options.release_gain;
   std::erase_if(all, [&](const Contender& c) {
-    const double least = c.released.empty() ? needed : rules_.options.release_gain;
-    return c.gain <= least || counted_gain(c) <= least ||
+    return c.gain <= c.needed || counted_gain(c) <= c.needed ||
            (c.released.empty() && !under_two_conditions(c));
   });
   sort_by_worth(all);
@@ -174,15 +190,19 @@ void Contest::put_simplest_first(std::vector<Contender>& all) const {
   std::rotate(all.begin(), simplest, simplest + 1);
 }
 
-/// Numbers, and two for every further tenth or tenfold of a usual size.
+/// Numbers that are something, and two for every further tenth or tenfold of a usual size.
 double Contest::intricacy(const Contender& c) const {
   double largest = 0;
+  std::size_t numbers = c.numbers.size();
   for (const FreedNumber& n : c.numbers)
     for (const FreeNumber& own : rules_.candidates[c.candidate].numbers)
-      if (own.key == n.number.key && !n.shape && !is_phase(own) && own.typical != 0)
-        largest = std::max(largest, std::abs(n.value / own.typical));
+      if (own.key == n.number.key && !n.shape && !is_phase(own) && own.typical != 0) {
+        const double size = std::abs(n.value / own.typical);
+        largest = std::max(largest, size);
+        numbers -= size < kNothing;
+      }
   const double unusual = largest > 0 ? std::max(0.0, std::abs(std::log10(largest)) - kUsual) : 0;
-  return static_cast<double>(c.numbers.size()) + 2 * unusual;
+  return static_cast<double>(numbers) + 2 * unusual;
 }
 
 /// Of what is left on the laps that are fitted and on those that are held out. What helps the
@@ -342,6 +362,7 @@ void Contest::look_ahead(const std::vector<Screened>& screened, std::vector<Cont
   if (best->counted < single + least) return;
   const std::size_t other = pairs[static_cast<std::size_t>(best - together.begin())].second;
   Contender c = contender({best->trial, screened[other].trial}, best->size, best->gain);
+  c.needed = rules_.threshold(ground_.held_out_of, c.fit.held_out_of);
   if (counted_gain(c) > single + least) all.insert(all.begin(), std::move(c));
 }
 

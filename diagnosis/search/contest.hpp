@@ -25,6 +25,7 @@ struct Contender {
   Refit fit;
   double gain = 0;
   std::string released;  ///< key of a declared number whose tolerance is lifted; else empty
+  double needed = 0;     ///< what it must gain to be told
   bool converged = false;
 
   /// Gain less what further numbers give by chance.
@@ -37,14 +38,18 @@ struct ContestRules {
   const std::vector<Candidate>& candidates;
   const DiagnosisOptions& options;
   std::vector<TrialColumns>& trials;
-  std::vector<double> base_of;  ///< held-out chi-square per channel before anything was found
-  double floor = 0;             ///< what noise leaves of held-out chi-square
+  std::vector<double> base_of;   ///< held-out chi-square per channel before anything was found
+  double floor = 0;              ///< what noise leaves of held-out chi-square
+  std::vector<double> floor_of;  ///< of it per channel
   /// Told what is done and how far it is; false stops the work.
   std::function<bool(const std::string&, double)> go;
 
   double excess(double held_out) const;
   /// What a candidate must gain where so much is left.
   double threshold(double held_out) const;
+  /// The same of one that takes the channels from `before` to `after`: only what is left where it
+  /// gains something is its concern.
+  double threshold(const std::vector<double>& before, const std::vector<double>& after) const;
 };
 
 class Contest {

@@ -10,7 +10,7 @@ constexpr double kNormal95 = 1.96;
 /// What the scatter of few conditions misses of the variance between them.
 constexpr double kFewConditions = 1.3;
 /// Standard deviation of a number, of its size, by the form of the law it belongs to.
-constexpr double kKnownTo = 0.01;
+constexpr double kKnownTo = 0.02;
 
 /// Two-sided 95 % quantile of Student's t: the expansion about the normal one (Abramowitz & Stegun
 /// 26.7.5), within 1 % from 3 degrees of freedom on.

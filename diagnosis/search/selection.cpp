@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <numeric>
 #include <set>
 
 #include "diagnosis/search/contest.hpp"
@@ -31,8 +32,9 @@ class Search {
   SelectionResult run() {
     go("fitting the declared machine", 0);
     result_.base = fit_declared(evidence_, declared_);
+    rules_.floor_of = noise_floor(evidence_, result_.base.residual, options_.form_of_channel);
     rules_.floor = result_.floor =
-        noise_floor(evidence_, result_.base.residual, options_.form_of_channel);
+        std::accumulate(rules_.floor_of.begin(), rules_.floor_of.end(), 0.0);
     rules_.base_of = evidence_.chi2_of(result_.base.residual, Role::held_out);
     simulate();
     result_.found = result_.base;
@@ -94,14 +96,12 @@ class Search {
   bool accept_one(FittedMachine& now, const std::vector<Contender>& contenders,
                   const Contest& contest) {
     for (std::size_t i = 0; i < std::min(kAttempts, contenders.size()) && going_; ++i) {
-      const double needed =
-          contenders[i].released.empty() ? rules_.threshold(now.held_out) : options_.release_gain;
       FittedMachine trial = now;
       add(trial, contenders[i],
           i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
       drop(trial);
       hold_again(trial);
-      if (now.held_out - trial.held_out > needed) {
+      if (now.held_out - trial.held_out > contenders[i].needed) {
         now = std::move(trial);
         return true;
       }
@@ -297,26 +297,24 @@ class Search {
   const DiagnosisOptions& options_;
   const KeepGoing& keep_going_;
   SelectionResult result_;
-  ContestRules rules_{evidence_,
-                      candidates_,
-                      options_,
-                      result_.trials,
-                      {},
-                      0,
-                      [this](const std::string& doing, double share) { return go(doing, share); }};
+  ContestRules rules_{
+      evidence_, candidates_,
+      options_,  result_.trials,
+      {},        0,
+      {},        [this](const std::string& doing, double share) { return go(doing, share); }};
   std::mutex guard_;
   bool going_ = true;
 };
 
 }  // namespace
 
-double noise_floor(const Evidence& evidence, const Column& residual,
-                   const std::vector<double>& form_of_channel) {
-  double floor = 0;
+std::vector<double> noise_floor(const Evidence& evidence, const Column& residual,
+                                const std::vector<double>& form_of_channel) {
+  std::vector<double> floor;
   for (std::size_t c = 0; c < residual.size(); ++c) {
     const double form = form_of_channel.empty() ? 0 : form_of_channel[c];
-    floor += std::min(evidence.count(c, Role::held_out) + form,
-                      evidence.chi2(residual, c, Role::held_out));
+    floor.push_back(std::min(evidence.count(c, Role::held_out) + form,
+                             evidence.chi2(residual, c, Role::held_out)));
   }
   return floor;
 }

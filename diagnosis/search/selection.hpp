@@ -62,7 +62,7 @@ SelectionResult select_effects_of(Evidence& evidence, const Machine& declared,
 
 /// Held-out chi-square that noise and the form of the model make: one per sample and the form's,
 /// less where a channel is quieter than that.
-double noise_floor(const Evidence& evidence, const Column& residual,
-                   const std::vector<double>& form_of_channel = {});
+std::vector<double> noise_floor(const Evidence& evidence, const Column& residual,
+                                const std::vector<double>& form_of_channel = {});
 
 }  // namespace vcnc

@@ -32,7 +32,9 @@ bool is_fixed(const FreeNumber& n) {
   return false;
 }
 
-bool is_phase(const FreeNumber& n) { return contains(n.key, ".phase_"); }
+bool is_phase(const FreeNumber& n) {
+  return contains(n.key, ".phase_") || contains(n.key, ".weight_imbalance.angle_");
+}
 
 bool has_no_phase(const FreeNumber& n) { return contains(n.key, "_bow_"); }
 

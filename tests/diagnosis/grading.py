@@ -19,6 +19,28 @@ OPEN = ("UNEXPLAINED", "PARTLY")
 # The same motion under two names, which no record can tell apart.
 ALIASES = {"bus_latency": "command_delay"}
 
+TRAVEL_PER_TURN = {"X": 12.0, "Y": 12.0, "Z": 12.0, "A": 360.0, "C": 360.0}  # mm, deg
+
+
+def waves_per_turn(name, place, numbers):
+    """Of a wave of the motor's force; None: of no such effect."""
+    for key, value in numbers.items():
+        if name == "torque_ripple" and key.endswith("order"):
+            return value
+        if name == "cogging" and "pole_pitch_" in key:
+            return TRAVEL_PER_TURN[place] / value
+    return None
+
+
+def same_wave(effect, found):
+    """Cogging with a whole number of waves per turn of the motor and a torque ripple of that order are one motion."""
+    if {effect["name"], found["name"]} != {"cogging", "torque_ripple"} or effect["place"] != found["axis"]:
+        return False
+    true = waves_per_turn(effect["name"], effect["place"], effect["parameters"])
+    told = waves_per_turn(found["name"], found["axis"], {n["key"]: n["value"] for n in found.get("parameters", [])})
+    return true is not None and told is not None and abs(told - true) < 0.02 * true
+
+
 # Where the force, displacement or reading of an effect may show up as a law.
 HOOKS = {
     "reception": ("command", "command_time"), "setpoint": ("command", "command_time"),
@@ -37,6 +59,8 @@ def same(effect, found):
     name, place = effect["name"], effect["place"]
     if found["name"] in (name, ALIASES.get(name)):
         return found["axis"] == place
+    if same_wave(effect, found):
+        return True
     if found["name"] == "deviation":
         key = found["axis"]
         if name == "load_mass":

@@ -53,6 +53,12 @@ class Grading(unittest.TestCase):
         self.assertEqual(of["pair: exact set"], "1/2 (50.0 %)")
         self.assertEqual(of["pair: exact set, each effect strong"], "1/1 (100.0 %)")
 
+    def test_cogging_of_whole_waves_per_turn_is_a_torque_ripple(self):
+        truth = {"kind": "single", "effects": [{"name": "torque_ripple", "place": "X", "parameters": {"amplitude_N": 20.0, "order": 6.0}}]}
+        for pitch, right in ((2.0, True), (2.2, False)):
+            told = found("cogging", "X", "effects.X.cogging.pole_pitch_mm", pitch)
+            self.assertEqual(grading.grade(truth, report(told), 1)["exact"], right)
+
     def test_everything_is_possible_earns_nothing(self):
         row = grading.grade(TRUTH, report(found("backlash", "X", **{"class": ["X.windup"] * 9})), 1)
         self.assertAlmostEqual(row["class"], 0.1)

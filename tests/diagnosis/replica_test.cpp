@@ -104,6 +104,39 @@ TEST(MachineReplica, IsFullAtItsAnchor) {
       same_bits(replica.predict(run.true_machine), replica.predict_in_full(run.true_machine)));
 }
 
+/// A piece that lies a quarter of a wave of the error elsewhere than the model knows.
+TEST(MachineReplica, SignalErrorsAreThoseOfTheDeflectionThatWasMeasured) {
+  Effects effects;
+  effects.get<PieceOffset>() = {Vec3(2.5e-6, 0, 0)};
+  const RecordedRun run = recorded_run(Showing::circle, kX, effects);
+  const MachineReplica replica = run.replica();
+  const auto change = [&](const Machine& machine, auto&& predict) {
+    Machine with = machine;
+    with.effects.get<SignalPhase>() = SignalPhase::nominal();
+    const Prediction before = predict(machine), after = predict(with);
+    std::vector<double> d;
+    for (std::size_t c = 0; c < before.size(); ++c)
+      if (replica.channels()[c].kind == SignalKind::deflection && replica.channels()[c].axis == 0)
+        for (std::size_t k = 0; k < before[c].size(); ++k) d.push_back(after[c][k] - before[c][k]);
+    return d;
+  };
+  const auto full = [&](const Machine& m) { return replica.predict_in_full(m); };
+  const std::vector<double> actual = change(run.true_machine, full),
+                            elsewhere = change(run.declared, full),
+                            found = change(run.declared,
+                                           [&](const Machine&m) { return replica.predict(m); });
+  ASSERT_EQ(found.size(), actual.size());
+  double size = 0, off = 0, off_elsewhere = 0;
+  for (std::size_t k = 0; k < actual.size(); ++k) {
+    size += actual[k] * actual[k];
+    off += std::pow(found[k] - actual[k], 2);
+    off_elsewhere += std::pow(elsewhere[k] - actual[k], 2);
+  }
+  EXPECT_GT(size, 0);
+  EXPECT_LT(std::sqrt(off / size), 0.1);
+  EXPECT_GT(std::sqrt(off_elsewhere / size), 0.5);
+}
+
 TEST(MachineReplica, ChanceIsNotPredicted) {
   const RecordedRun& run = reversals();
   const MachineReplica replica = run.replica();
