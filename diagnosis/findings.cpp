@@ -325,6 +325,11 @@ class Report {
       e.numbers.push_back(fitted(n));
       Machine without = found().machine;
       move_number(without, key, n.centre);
+      if (e.numbers.front().low <= n.centre && n.centre <= e.numbers.front().high) {
+        d_.notes.push_back(fmt::format("{} may be out of tolerance, or as declared.", key));
+        move_number(d_.found, key, number_of(selection_.base.machine, key));
+        continue;
+      }
       const Prediction less = evidence_.predict(without);
       e.contour_error_um = consequence(evidence_, found().prediction, less).contour_um;
       if (negligible(e, without, less)) continue;

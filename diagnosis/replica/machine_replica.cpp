@@ -128,9 +128,10 @@ struct MachineReplica::Anchor {
   NearbyPoses poses;
   bool needs_full = false;
   ProbeReplay full;
-  Deflections ball_offset;     ///< full less quick, and off_record()
-  Deflections reading_offset;  ///< full less quick, both of the full ball, less off_record()
-  Deflections reading;         ///< of the anchor
+  Deflections off_record;
+  Deflections ball_offset;     ///< full less quick
+  Deflections reading_offset;  ///< the same, both of the full ball
+  Deflections reading;         ///< of the anchor, with signal errors where they were measured
 };
 
 MachineReplica::MachineReplica(const Record& record, const Machine& declared,
@@ -230,14 +231,14 @@ void MachineReplica::anchor(const Machine& machine) {
   anchor->full = replay_probe(h.actual, piece_.get(), axes);
   const Deflections quick = replay_contact(
       h.actual, piece_.get(), {anchor->poses, anchor->poses.poses(), anchor->poses.axes()});
-  const Deflections off = off_record(anchor->full.reading), &ball = anchor->full.ball;
-  anchor->ball_offset = sum(sum(ball, quick, -1), off, 1);
-  anchor->reading_offset =
-      sum(sum(anchor->full.reading, replay_sensing(h.actual, ball, axes), -1), off, -1);
+  const ProbeReplay& full = anchor->full;
+  anchor->off_record = off_record(full.reading);
+  anchor->ball_offset = sum(full.ball, quick, -1);
+  anchor->reading_offset = sum(full.reading, replay_sensing(h.actual, full.ball, axes), -1);
   anchor->reading = signals_err(h.actual) && !anchor->needs_full
-                        ? sum(replay_sensing(h.actual, sum(ball, off, 1), axes),
+                        ? sum(replay_sensing(h.actual, full.ball, axes, &anchor->off_record),
                               anchor->reading_offset, 1)
-                        : anchor->full.reading;
+                        : full.reading;
   anchor_ = std::move(anchor);
   pose_memory_->clear();  // they hold what was seen from another anchor
   ball_memory_->clear();
@@ -248,7 +249,8 @@ Deflections MachineReplica::reading_of(const Hypothesis& h, const AxisReplays& a
   if (anchor_->needs_full || needs_full_probe(h.actual))
     return replay_probe(h.actual, piece_.get(), axes).reading;
   const Deflections ball = sum(*ball_of(h, axes), anchor_->ball_offset, 1);
-  return sum(replay_sensing(h.actual, ball, axes), anchor_->reading_offset, 1);
+  return sum(replay_sensing(h.actual, ball, axes, &anchor_->off_record), anchor_->reading_offset,
+             1);
 }
 
 /// What was measured less `reading`, as a moving mean, a period of the signals at most.

@@ -22,9 +22,8 @@
 // better. What cannot be had quickly is computed in full.
 //
 // Errors of the signals repeat with every few micrometres of deflection, and where the ball is, the
-// model may not know to one. They are therefore taken where the record says it was: quick(x) above
-// is of the ball moved by d, less d, where d is what the record is off the anchor's reading, as a
-// moving mean of 21 ms.
+// model may not know to one. They are therefore taken where the record says it was: moved by what
+// the record is off the anchor's reading, as a moving mean of 21 ms.
 #pragma once
 
 #include <map>

@@ -240,8 +240,8 @@ Deflections replay_contact(const Machine& actual, const Piece* piece, NearbyPose
   return ball;
 }
 
-Deflections replay_sensing(const Machine& actual, const Deflections& ball,
-                           const AxisReplays& axes) {
+Deflections replay_sensing(const Machine& actual, const Deflections& ball, const AxisReplays& axes,
+                           const Deflections* moved) {
   Chain<DeflectionPort> feeling = machine_chain<DeflectionPort>(actual.effects, kSeed);
   Chain<AnaloguePort> signals = machine_chain<AnaloguePort>(actual.effects, kSeed);
   Chain<ReadingPort> counting = machine_chain<ReadingPort>(actual.effects, kSeed);
@@ -256,7 +256,8 @@ Deflections replay_sensing(const Machine& actual, const Deflections& ball,
       x = signal.deflection;
     }
     for (int c = 0; c < 3 && !signals.empty(); ++c) {
-      const double phase = 2 * kPi / period * x[c];
+      const double by = moved ? (*moved)[static_cast<std::size_t>(c)][k] : 0;
+      const double phase = 2 * kPi / period * (x[c] + by);
       AnaloguePort::Signal<double> signal{kSignalAmplitude * std::cos(phase),
                                           kSignalAmplitude * std::sin(phase)};
       signals.step(signal, {moment_of(k), c, kSignalAmplitude});

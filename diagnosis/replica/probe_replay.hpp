@@ -89,8 +89,10 @@ class NearbyPoses {
 
 /// Quickly: the true deflection of the ball.
 Deflections replay_contact(const Machine& actual, const Piece* piece, NearbyPoses::Course poses);
-/// Quickly: what the probe says of it.
-Deflections replay_sensing(const Machine& actual, const Deflections& ball, const AxisReplays& axes);
+/// Quickly: what the probe says of it, with the errors of its signals taken where the ball is moved
+/// by `moved`; null: where it is.
+Deflections replay_sensing(const Machine& actual, const Deflections& ball, const AxisReplays& axes,
+                           const Deflections* moved = nullptr);
 
 /// What only the full probe tells: the piece that is lifted, the hysteresis of the guides, whose
 /// friction depends on the sliding within a cycle, and effects on signals that are corrected

@@ -233,7 +233,8 @@ Contender Contest::contender(const std::vector<std::size_t>& trials, const Eigen
       at += width;
     }
     c.candidate = rules_.trials[trials.front()].trial.candidate;
-    c.fit = refit(rules_.evidence, c.begun, c.numbers, without(linear_, c.numbers), kGlance);
+    c.fit = refit(rules_.evidence, c.begun, c.numbers, without(linear_, c.numbers), kGlance,
+                  Begin::far);
     c.numbers = c.fit.live;
     c.gain = gain_of(c.fit.fitted, c.fit.held_out);
     const bool first = share == 1.0;

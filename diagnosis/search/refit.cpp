@@ -195,7 +195,8 @@ std::vector<Column> columns_of(const Evidence& evidence, const Machine& machine,
 }
 
 Refit refit(const Evidence& evidence, const Machine& start, const std::vector<FreedNumber>& live,
-            const LinearPart& linear, int max_iterations, const std::vector<double>& weight) {
+            const LinearPart& linear, int max_iterations, Begin begin,
+            const std::vector<double>& weight) {
   Refit result;
   const auto k = static_cast<Eigen::Index>(live.size());
   const Products products(evidence, linear.columns);
@@ -226,6 +227,7 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
   problem.start.resize(k), problem.min.resize(k), problem.max.resize(k);
   problem.max_iterations = max_iterations;
   problem.cautious =
+      begin == Begin::far &&
       std::any_of(live.begin(), live.end(), [](const FreedNumber& n) { return n.shape; });
   for (std::size_t i = 0; i < live.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);

@@ -58,9 +58,12 @@ struct Refit {
   int simulations = 0;
 };
 
+/// How a search begins: as sensitivities tell, or with short steps where shapes are far off.
+enum class Begin { near, far };
+
 /// `weight` of each channel's chi-square in what is made least; none given: all 1.
 Refit refit(const Evidence& evidence, const Machine& start, const std::vector<FreedNumber>& live,
-            const LinearPart& linear, int max_iterations = 12,
+            const LinearPart& linear, int max_iterations = 12, Begin begin = Begin::near,
             const std::vector<double>& weight = {});
 
 /// Forward differences of a prediction with respect to some numbers, per typical size.

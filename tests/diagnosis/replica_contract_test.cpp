@@ -96,7 +96,10 @@ TEST_P(ReplicaContract, ReproducesTheWholeMachine) {
   EXPECT_LT(of(full, deflection).rms, 1 * nm);
   EXPECT_LT(of(full, deflection).largest, 20 * nm);
   // The drift's ring of samples is coarser, which shows while the ball touches the piece first.
-  const double coarse = GetParam() == "clock_drift" ? 0.08 : 0.02;
+  // Where the ball is slow the mean over 21 ms holds some of the signals' error itself.
+  const double coarse = GetParam() == "clock_drift"         ? 0.08
+                        : GetParam().starts_with("signal_") ? 0.03
+                                                            : 0.02;
   const double change = of(replica.predict(run.declared), deflection).rms;
   EXPECT_LT(of(quick, deflection).rms, 0.1 * nm + coarse * change);
 }
