@@ -180,18 +180,19 @@ std::vector<Screened> Contest::likes_of(const std::vector<Contender>& all,
 /// Of those that do as well as the first, the one with the fewest numbers, of a size nearest to
 /// the typical one.
 void Contest::put_simplest_first(std::vector<Contender>& all) const {
-  if (all.empty() || !all.front().released.empty()) return;
+  if (all.empty()) return;
   const double most = all.front().gain, band = band_of(most);
   // A gain that is less by the band weighs like one number more.
   const auto cost = [&](const Contender& c) { return intricacy(c) + (most - c.gain) / band; };
   auto simplest = all.begin();
   for (auto c = all.begin(); c != all.end(); ++c)
-    if (c->released.empty() && c->gain > most - band && cost(*c) < cost(*simplest)) simplest = c;
+    if (c->gain > most - band && cost(*c) < cost(*simplest)) simplest = c;
   std::rotate(all.begin(), simplest, simplest + 1);
 }
 
 /// Numbers that are something, and two for every further tenth or tenfold of a usual size.
 double Contest::intricacy(const Contender& c) const {
+  if (!c.released.empty()) return 1;
   double largest = 0;
   std::size_t numbers = c.numbers.size();
   for (const FreedNumber& n : c.numbers)

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/search/contest.hpp"
 #include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/least_squares.hpp"
 #include "diagnosis/search/noise_audit.hpp"
@@ -172,6 +173,32 @@ TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {
   EXPECT_DOUBLE_EQ(counted(110, {500, 600}, {490, 500}, doubt), 100);
 }
 
+TEST(CountedGain, DoubtsALawLessThatWasSeenToBeRight) {
+  DiagnosisOptions options;
+  options.share_of_found = 0.01;
+  // It leaves 1e-5 of what it explains where it explains most: four times that much is doubted.
+  const Doubt doubt = doubt_of(options, {1e7 + 100, 1e6 + 500}, {100, 500});
+  EXPECT_NEAR(doubt[0], 400, 1e-6);
+  EXPECT_NEAR(doubt[1], 40, 1e-6);
+}
+
+TEST(Threshold, CountsWhatIsLeftInTheChannelsThatGain) {
+  Record record = toy::commands(400, 4);
+  toy::measure(record, Machine(), 1);
+  toy::ToyReplica replica(record);
+  const Evidence evidence(record, replica, Machine());
+  const std::vector<Candidate> none;
+  std::vector<TrialColumns> trials;
+  DiagnosisOptions options;
+  options.least_gain = 25;
+  options.least_share = 0.02;
+  const ContestRules rules{evidence, none, options, trials, {}, 2000, {1000, 1000}, {}};
+  // 100000 are left in the other channel, which gains nothing.
+  EXPECT_DOUBLE_EQ(rules.threshold({101000, 3000}, {101000, 1500}), 0.02 * 2000);
+  EXPECT_DOUBLE_EQ(rules.threshold({101000, 3000}, {91000, 1500}), 0.02 * 102000);
+  EXPECT_DOUBLE_EQ(rules.threshold({101000, 1100}, {101000, 1000}), 25);
+}
+
 TEST(Screening, DetectionLimitIsWhereTheHeldOutHalfGainsEnough) {
   Record record = toy::commands(1000, 4);
   toy::measure(record, Machine(), 2);
@@ -268,8 +295,60 @@ TEST(Trials, ALimitIsTriedWholeAtEveryValue) {
     const Machine tried = machine_of(Machine(), clip, all[i], all[i].directions[0]);
     EXPECT_DOUBLE_EQ(number_of(tried, "effects.probe.range_clip.limit_mm"), value);
     // However much of it the residual holds: half a limit is no smaller effect.
-    EXPECT_DOUBLE_EQ(start_of(clip, all[i], Eigen::VectorXd::Constant(1, 0.02), Eigen::VectorXd::Ones(1))[0].value, value);
+    EXPECT_DOUBLE_EQ(
+        start_of(clip, all[i], Eigen::VectorXd::Constant(1, 0.02), Eigen::VectorXd::Ones(1))[0]
+            .value,
+        value);
   }
+}
+
+/// A ripple of a direct drive has waves per turn that no linear axis has.
+TEST(Trials, WholeNumbersAreTriedAndStay) {
+  const Candidate ripple{"torque_ripple",
+                         "A",
+                         {{"effects.A.torque_ripple.amplitude_Nm", 1, 0, 1e5, true},
+                          {"effects.A.torque_ripple.order", 24, 1, 1000, false, true},
+                          {"effects.A.torque_ripple.phase_deg", 0, -360, 360}},
+                         {1, 2}};
+  const std::vector<Trial> all = trials(Machine(), {ripple}, [](const Candidate&, std::size_t) {
+    return std::vector<double>{12, 24};
+  });
+  ASSERT_EQ(all.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    Machine tried = machine_of(Machine(), ripple, all[i], all[i].directions[0]);
+    EXPECT_EQ(tried.effects.axis[kA].get<TorqueRipple>().order, i == 0 ? 12 : 24);
+    const std::vector<FreedNumber> start =
+        start_of(ripple, all[i], Eigen::Vector2d(0, 2), Eigen::Vector2d(1, 1));
+    ASSERT_EQ(start.size(), 2U);  // amplitude and phase
+    EXPECT_NEAR(start[0].value, 2, 1e-12);
+    EXPECT_NEAR(start[1].value, 90, 1e-12);
+    Machine fresh;
+    set_whole_numbers(fresh, ripple, all[i]);
+    EXPECT_EQ(fresh.effects.axis[kA].get<TorqueRipple>().order, i == 0 ? 12 : 24);
+  }
+}
+
+/// Of two amplitudes with one phase, the phase is that of the one which does most.
+TEST(Trials, ThePhaseIsThatOfTheAmplitudeThatDoesMost) {
+  const Candidate ripple{"torque_ripple",
+                         "X",
+                         {{"effects.X.torque_ripple.amplitude_N", 40, 0, 1e5, true},
+                          {"effects.X.torque_ripple.share_percent", 2, 0, 50, true},
+                          {"effects.X.torque_ripple.phase_deg", 0, -360, 360}},
+                         {2}};
+  const Trial trial = trials(
+      Machine(), {ripple}, [](const Candidate&, std::size_t) { return std::vector<double>{}; })[0];
+  ASSERT_EQ(trial.directions.size(), 4U);
+  // Half a typical amplitude at 90 deg, a typical share at 0 deg that does next to nothing.
+  const std::vector<FreedNumber> start =
+      start_of(ripple, trial, Eigen::Vector4d(0, 0.5, 1, 0), Eigen::Vector4d(100, 100, 1, 1));
+  EXPECT_NEAR(start[0].value, 20, 1e-9);
+  EXPECT_NEAR(start[2].value, 90, 1e-9);
+}
+
+TEST(Trials, TheAngleOfAWeightIsAPhase) {
+  EXPECT_TRUE(is_phase({"effects.A.weight_imbalance.angle_deg"}));
+  EXPECT_FALSE(is_phase({"effects.probe.signal_phase.angle_deg.x"}));
 }
 
 TEST(Intervals, KnowThatALawIsKnownToTwoPercentOnly) {
