@@ -264,10 +264,10 @@ void Contest::finish(std::vector<Contender>& all) const {
   });
 }
 
-/// A law that leaves something may fit better from another of its shapes: the next best trials of
-/// the winner are refitted as well.
+/// The first law, where it leaves something, may fit better from another of its shapes: the next
+/// best trials of the winner are refitted as well.
 void Contest::begin_elsewhere(Contender& best, const std::vector<Screened>& trials) const {
-  if (!best.released.empty() ||
+  if (!now_.added.empty() || !best.released.empty() ||
       rules_.excess(ground_.held_out - best.gain) < kLeaves * rules_.excess(ground_.held_out))
     return;
   std::vector<Contender> others;
