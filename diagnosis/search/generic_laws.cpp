@@ -296,6 +296,19 @@ LinearLaw fit(const Evidence& evidence, const Ground& ground, const std::vector<
   return law;
 }
 
+/// A machine with the numbers that go along with its law moved, where that is for the better: a law
+/// of the position and a constant may be large and cancel.
+Machine settled(const Evidence& evidence, const Machine& machine, const Ground& at,
+                const LinearPart& linear) {
+  const LinearStep s = linear_step(at.grams.fitted, at.grams.held_out, at.precision, at.offset);
+  std::vector<FreedNumber> numbers = linear.numbers;
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    numbers[i].value += s.step[static_cast<Eigen::Index>(i)] * numbers[i].number.typical;
+  Machine moved = with(machine, numbers);
+  const double after = evidence.chi2(evidence.residual(evidence.predict(moved)), Role::fitted);
+  return after < at.grams.fitted(0, 0) ? moved : machine;
+}
+
 }  // namespace
 
 std::string words_of(const Law& law) {
@@ -347,7 +360,6 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
         counted(ground.held_out - left.held_out, ground.held_out_of, left.held_out_of, doubt);
     if (gain <= best.gain) continue;
     best.gain = gain;
-    best.machine = std::move(machine);
     law.label = "learned: " + words_of(law);
     best.law.low.clear(), best.law.high.clear();
     for (Eigen::Index h = 0; h < f.value.size(); ++h) {
@@ -357,7 +369,8 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
     best.law.words = "behaves like " + words_of(law);
     best.law.share = std::min(1.0, gain / excess);
     best.law.law = law;
-    best.machine.effects.laws.back() = law;
+    machine.effects.laws.back() = law;
+    best.machine = settled(evidence, machine, left, linear);
   }
   const double band = options.class_gain + options.class_share * excess;
   for (const std::size_t i : order)
