@@ -23,6 +23,9 @@ constexpr double kShareOfFound = 0.005;
 /// piece is clamped anew and friction is that of another day.
 constexpr double kChangeOfForm = 0.05;
 
+/// Effects that are told between two runs of one machine: more are a law that nobody has named.
+constexpr std::size_t kMostChanges = 5;
+
 /// Chi-square of the held-out laps that this makes.
 std::vector<double> forms_of(const Evidence& evidence, const DifferentialRecord& difference) {
   const std::vector<ComparedChannel>& channels = evidence.replica().channels();
@@ -48,6 +51,7 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
   if (slip) declared.effects.get<PeriodSlip>() = *slip;
   Evidence evidence(of.record, of.replica, declared, difference ? difference->noise_scale : 1);
   if (difference) {
+    options.max_effects = std::min(options.max_effects, kMostChanges);
     options.form_of_channel = forms_of(evidence, *difference);
     options.form_um = 1e6 * kChangeOfForm *
                       std::hypot(difference->off[0], difference->off[1], difference->off[2]);

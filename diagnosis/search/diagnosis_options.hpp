@@ -32,7 +32,7 @@ struct DiagnosisOptions {
   double release_gain = 25;       ///< of one whose tolerance is lifted, priors included
   double clamped_um = 5;          ///< offset of the piece that is worth a word; 10 urad per um
   std::size_t refits = 5, per_family = 2, pairs_of = 10;
-  std::size_t max_effects = 5;
+  std::size_t max_effects = 8;
 };
 
 }  // namespace vcnc
