@@ -9,23 +9,27 @@
 namespace vcnc {
 namespace {
 
+struct Collected {
+  std::vector<Parameter> numbers;
+  std::vector<WholeParameter> whole;
+};
+
 /// A visitor of fields() that keeps every number.
 class Collector {
  public:
-  Collector(std::vector<Parameter>& all, std::vector<WholeParameter>& whole)
-      : all_(all), whole_(whole) {}
+  explicit Collector(Collected& all) : all_(all) {}
 
   void operator()(std::string_view key, double& v, Unit u, Range r, const char*) {
-    all_.push_back({path_ + std::string(key), &v, u, r});
+    all_.numbers.push_back({path_ + std::string(key), &v, u, r});
   }
   void operator()(std::string_view key, Vec3& v, Unit u, Range r, const char*) {
     for (Eigen::Index i = 0; i < 3; ++i)
-      all_.push_back({path_ + std::string(key) + "." + "xyz"[i], &v[i], u, r});
+      all_.numbers.push_back({path_ + std::string(key) + "." + "xyz"[i], &v[i], u, r});
   }
   void operator()(std::string_view, std::vector<double>&, Unit, Range, const char*) {}
   void operator()(std::string_view, std::vector<Vec3>&, Unit, Range, const char*) {}
   void operator()(std::string_view key, int& v, Range r, const char*) {
-    whole_.push_back({path_ + std::string(key), &v, r});
+    all_.whole.push_back({path_ + std::string(key), &v, r});
   }
   void operator()(std::string_view, bool&, const char*) {}
   void operator()(std::string_view, std::string&, const char*) {}
@@ -51,28 +55,22 @@ class Collector {
   }
 
  private:
-  std::vector<Parameter>& all_;
-  std::vector<WholeParameter>& whole_;
+  Collected& all_;
   std::string path_;
 };
 
-}  // namespace
-
-std::vector<Parameter> parameters(Machine& machine) {
-  std::vector<Parameter> all;
-  std::vector<WholeParameter> whole;
-  Collector collector(all, whole);
+Collected collected(Machine& machine) {
+  Collected all;
+  Collector collector(all);
   Machine::fields(machine, collector);
   return all;
 }
 
-std::vector<WholeParameter> whole_parameters(Machine& machine) {
-  std::vector<Parameter> all;
-  std::vector<WholeParameter> whole;
-  Collector collector(all, whole);
-  Machine::fields(machine, collector);
-  return whole;
-}
+}  // namespace
+
+std::vector<Parameter> parameters(Machine& machine) { return collected(machine).numbers; }
+
+std::vector<WholeParameter> whole_parameters(Machine& machine) { return collected(machine).whole; }
 
 void set_parameter(Machine& machine, const std::string& key, double value) {
   for (const Parameter& p : parameters(machine)) {
