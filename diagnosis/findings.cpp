@@ -12,6 +12,7 @@
 #include "diagnosis/search/freed_number.hpp"
 #include "diagnosis/search/generic_laws.hpp"
 #include "diagnosis/search/intervals.hpp"
+#include "diagnosis/search/screening.hpp"
 #include "model/axes.hpp"
 #include "model/effects/list.hpp"
 
@@ -333,6 +334,8 @@ class Report {
       const Prediction less = evidence_.predict(without);
       e.contour_error_um = consequence(evidence_, found().prediction, less).contour_um;
       if (negligible(e, without, less)) continue;
+      const FittedMachine held = found().holding(key, selection_.base);
+      e.gain = Ground(evidence_, held.residual, held.linear()).held_out - found().held_out;
       d_.effects.push_back(std::move(e));
     }
   }
@@ -358,10 +361,15 @@ class Report {
     without.effects.get<PeriodSlip>() = {};
     const Prediction less = evidence_.predict(without);
     e.contour_error_um = consequence(evidence_, found().prediction, less).contour_um;
-    e.gain = evidence_.chi2(evidence_.residual(less), Role::held_out) -
-             evidence_.chi2(found().residual, Role::held_out);
+    e.gain = lost(less);
     e.acquisition = true;
     d_.effects.push_back(std::move(e));
+  }
+
+  /// Held-out chi-square that a prediction leaves beyond that of the found machine.
+  double lost(const Prediction& without) const {
+    return evidence_.chi2(evidence_.residual(without), Role::held_out) -
+           evidence_.chi2(found().residual, Role::held_out);
   }
 
   /// What a number does to the contour by standing where it stands.
@@ -396,6 +404,10 @@ class Report {
       if (e.name.empty()) continue;
       // Between two runs the piece was clamped anew: that is no finding.
       if (!d_.differential) {
+        Machine without = found().machine;
+        for (const FittedNumber& n : e.numbers)
+          move_number(without, n.key, number_of(of_.declared, n.key));
+        e.gain = lost(evidence_.predict(without));
         d_.effects.push_back(std::move(e));
         continue;
       }
@@ -457,7 +469,9 @@ class Report {
                      doubt_of(options_, anything ? base : std::vector<double>{}, now), options_);
     // A law that does better than all that was named takes the names away.
     if (!found().added.empty()) {
-      LawFit instead = best_law(evidence_, selection_.base, doubt_of(options_, {}, base), options_);
+      LawFit instead = selection_.law_alone ? *selection_.law_alone
+                                            : best_law(evidence_, selection_.base,
+                                                       doubt_of(options_, {}, base), options_);
       const double named = selection_.base.held_out - found().held_out;
       const double clearly = needed + options_.share_of_found * named;
       if (instead.gain > (found().added.size() > 1 ? named : named + clearly) &&

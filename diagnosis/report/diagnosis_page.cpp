@@ -49,7 +49,7 @@ const char* verdict_class(DiagnosisVerdict v) {
 /// The interval between zero and its far end, with a tick at zero.
 std::string interval_bar(const FittedNumber& n) {
   const double low = std::min(0.0, n.low), high = std::max(0.0, n.high);
-  if (!(high > low) || !std::isfinite(high - low)) return "";
+  if (!(n.high > n.low) || !std::isfinite(high - low)) return "";
   const auto share = [&](double v) { return (v - low) / (high - low) * 100; };
   return fmt::format(
       "<div class=\"bar\"><u style=\"left:{:.1f}%\"></u><i "

@@ -41,6 +41,7 @@ std::string unit_of_key(const std::string& key) {
 
 std::string with_interval(const FittedNumber& n) {
   const double width = n.high - n.low;
+  if (width == 0) return fmt::format("{:g}", n.value);  // tried, as whole numbers are
   const double least = std::isfinite(width) && width > 0 ? width : std::abs(n.value) * 1e-3;
   const int digits =
       least > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(least))), 0, 9) : 3;

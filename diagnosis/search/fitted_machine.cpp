@@ -122,6 +122,15 @@ std::vector<FreedNumber> FittedMachine::numbers() const {
   return all;
 }
 
+FittedMachine FittedMachine::holding(const std::string& key, const FittedMachine& base) const {
+  FittedMachine held = *this;
+  std::erase(held.released, key);
+  for (FreedNumber& n : held.nuisances.numbers)
+    for (const FreedNumber& as : base.nuisances.numbers)
+      if (n.number.key == key && as.number.key == key) n.tolerance = as.tolerance;
+  return held;
+}
+
 LinearPart FittedMachine::linear() const {
   LinearPart all = nuisances;
   const std::vector<FreedNumber> more = numbers();

@@ -33,6 +33,8 @@ struct FittedMachine {
   std::vector<FreedNumber> numbers() const;  ///< of all added effects
   /// Nuisances and added effects with their columns.
   LinearPart linear() const;
+  /// With a declared number that was released held again as in `base`, nothing fitted.
+  FittedMachine holding(const std::string& key, const FittedMachine& base) const;
 };
 
 /// Fits all numbers of a machine together, nuisances included, until nothing moves.

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 #include "diagnosis/search/parallel.hpp"
 #include "diagnosis/search/screening.hpp"
@@ -13,6 +15,9 @@ namespace vcnc {
 namespace {
 
 constexpr std::size_t kHats = 10;
+constexpr std::size_t kSimulated = 3;  // of the best laws by their columns
+constexpr int kRounds = 4;
+constexpr double kNudge = 0.02, kWorthARound = 0.99;
 constexpr double kPulse = 2e-3;  // half width of the pulse [s]
 
 using Series = std::vector<double>;
@@ -87,6 +92,7 @@ class Laws {
         if (j == i || !moves_[j]) continue;
         for (const Covariate c : {position, velocity, acceleration})
           add(Point::displacement, c, j, time);
+        for (const Covariate times : {time, sign}) add(Point::table_force, position, j, times);
       }
       if (!is_read(i)) continue;
       for (std::size_t j = 0; j < kAxisCount; ++j)
@@ -296,6 +302,66 @@ LinearLaw fit(const Evidence& evidence, const Ground& ground, const std::vector<
   return law;
 }
 
+/// A law where it acts, in the loop.
+struct Acting {
+  Law law;
+  Machine machine;
+  Prediction prediction;
+  Column residual;
+  Ground ground;
+
+  Acting(const Evidence& evidence, const Machine& without, Law own, const LinearPart& linear)
+      : law(std::move(own)),
+        machine(with(without, law)),
+        prediction(evidence.predict(machine)),
+        residual(evidence.residual(prediction)),
+        ground(evidence, residual, linear) {}
+
+  Acting(const Acting&) = delete;  // the ground refers to the residual
+
+  static Machine with(Machine machine, const Law& law) {
+    machine.effects.laws.push_back(law);
+    return machine;
+  }
+};
+
+/// Fits the values of a law again where it acts: the first ones come from the loop without it, and
+/// friction is not linear. Returns their standard deviations.
+Eigen::VectorXd refine(const Evidence& evidence, const Machine& without, const LinearPart& linear,
+                       std::unique_ptr<Acting>& best) {
+  LinearLaw fitted;
+  for (int round = 0; round < kRounds; ++round) {
+    const Acting& acting = *best;
+    double largest = 0;
+    for (const double v : acting.law.value) largest = std::max(largest, std::abs(v));
+    const double step = kNudge * largest;
+    std::vector<Machine> nudged;
+    for (std::size_t h = 0; h < acting.law.value.size(); ++h) {
+      nudged.push_back(acting.machine);
+      nudged.back().effects.laws.back().value[h] += step;
+    }
+    const std::vector<Prediction> predictions = evidence.predict_all(nudged);
+    std::vector<Column> columns(nudged.size());
+    parallel_for(nudged.size(), [&](std::size_t h) {
+      columns[h] = evidence.sensitivity(acting.prediction, predictions[h], step);
+    });
+    fitted = fit(evidence, acting.ground, columns);
+    bool better = false;
+    for (const double share : {1.0, 0.3}) {
+      Law law = acting.law;
+      for (std::size_t h = 0; h < law.value.size(); ++h)
+        law.value[h] += share * fitted.value[static_cast<Eigen::Index>(h)];
+      auto next = std::make_unique<Acting>(evidence, without, law, linear);
+      if (!(next->ground.fitted < acting.ground.fitted)) continue;
+      better = next->ground.fitted < kWorthARound * acting.ground.fitted;
+      best = std::move(next);
+      break;
+    }
+    if (!better) break;
+  }
+  return fitted.sigma;
+}
+
 /// A machine with the numbers that go along with its law moved, where that is for the better: a law
 /// of the position and a constant may be large and cancel.
 Machine settled(const Evidence& evidence, const Machine& machine, const Ground& at,
@@ -346,35 +412,40 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t x, std::size_t y) { return fits[x].gain > fits[y].gain; });
-  // The columns are a linearisation; the first three are asked what they do in the loop.
-  for (std::size_t rank = 0; rank < std::min<std::size_t>(3, order.size()); ++rank) {
+  // The columns are a linearisation; the first few are asked what they do in the loop.
+  const auto counted_of = [&](const Acting& law) {
+    return counted(ground.held_out - law.ground.held_out, ground.held_out_of,
+                   law.ground.held_out_of, doubt);
+  };
+  std::unique_ptr<Acting> acting;
+  for (std::size_t rank = 0; rank < std::min(kSimulated, order.size()); ++rank) {
     const LinearLaw& f = fits[order[rank]];
     if (f.gain < options.law_gain) break;
     Law law = all[order[rank]];
     law.value.assign(f.value.data(), f.value.data() + f.value.size());
-    Machine machine = at.machine;
-    machine.effects.laws.push_back(law);
-    const Column residual = evidence.residual(evidence.predict(machine));
-    const Ground left(evidence, residual, linear);
-    const double gain =
-        counted(ground.held_out - left.held_out, ground.held_out_of, left.held_out_of, doubt);
-    if (gain <= best.gain) continue;
-    best.gain = gain;
-    law.label = "learned: " + words_of(law);
-    best.law.low.clear(), best.law.high.clear();
-    for (Eigen::Index h = 0; h < f.value.size(); ++h) {
-      best.law.low.push_back(f.value[h] - 1.96 * f.sigma[h]);
-      best.law.high.push_back(f.value[h] + 1.96 * f.sigma[h]);
+    auto now = std::make_unique<Acting>(evidence, at.machine, law, linear);
+    if (const double gain = counted_of(*now); gain > best.gain) {
+      best.gain = gain;
+      acting = std::move(now);
     }
-    best.law.words = "behaves like " + words_of(law);
-    best.law.share = std::min(1.0, gain / excess);
-    best.law.law = law;
-    machine.effects.laws.back() = law;
-    best.machine = settled(evidence, machine, left, linear);
   }
+  if (!acting) return best;
+  const Eigen::VectorXd sigma = refine(evidence, at.machine, linear, acting);
+  Law& law = best.law.law = acting->law;
+  law.label = "learned: " + words_of(law);
+  for (std::size_t h = 0; h < law.value.size(); ++h) {
+    const double band = 1.96 * sigma[static_cast<Eigen::Index>(h)];
+    best.law.low.push_back(law.value[h] - band);
+    best.law.high.push_back(law.value[h] + band);
+  }
+  best.gain = counted_of(*acting);
+  best.law.words = "behaves like " + words_of(law);
+  best.law.share = std::min(1.0, best.gain / excess);
+  acting->machine.effects.laws.back() = law;
+  best.machine = settled(evidence, acting->machine, acting->ground, linear);
   const double band = options.class_gain + options.class_share * excess;
   for (const std::size_t i : order)
-    if (best.gain > 0 && fits[i].gain > best.gain - band &&
+    if (fits[i].gain > fits[order.front()].gain - band &&
         words_of(all[i]) != words_of(best.law.law) && best.law.not_distinguishable_from.size() < 5)
       best.law.not_distinguishable_from.push_back(words_of(all[i]));
   return best;

@@ -5,8 +5,9 @@
 // at a point of an axis (model/effects/law.hpp): force on the table, displacement of the tool
 // centre, reading of the probe. m is 1, a sign of the velocity or a position. To first order the
 // closed loop answers a force by a convolution and a displacement at once, so that one pulse and
-// one constant law per axis, simulated, give the columns of every law. The best law is then
-// simulated itself; what it gains there on the held-out laps counts.
+// one constant law per axis, simulated, give the columns of every law. The best few laws are then
+// simulated themselves and the best of these is fitted again where it acts (Gauss-Newton); what it
+// gains there on the held-out laps counts.
 //
 // Known limits: a law that only acts while an axis sticks is not linear; laws that differ by less
 // than the equivalence band (30 and 5 %) are told as such.

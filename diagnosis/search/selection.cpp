@@ -17,6 +17,7 @@ constexpr double kClearLoss = 4;          ///< times the least gain: no need to 
 constexpr std::size_t kAttempts = 3;      ///< contenders that are fitted together with all else
 constexpr std::size_t kAlternatives = 1;  ///< other beginnings
 constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to look for another one
+constexpr std::size_t kImitation = 3;  ///< names that are too many where one law does better
 constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
 
 class Search {
@@ -44,6 +45,7 @@ class Search {
       result_.found = climbed(contenders, contest, result_.ladder);
       for (const Contender& other : alternatives(contenders)) {
         if (!going_ || result_.found.held_out < options_.model_form * result_.floor) break;
+        if (imitates(result_.found)) break;
         std::vector<LadderStep> ladder;
         FittedMachine found = climbed({other}, contest, ladder);
         if (!going_ || found.held_out > result_.found.held_out - options_.least_gain) continue;
@@ -74,10 +76,25 @@ class Search {
       exchange(now);
       ladder.push_back(step_of(now, ladder.size()));
       if (now.added.size() + now.released.size() >= options_.max_effects) break;
+      if (imitates(now)) break;
       Contest contest(rules_, now);
       if (!accept_one(now, contest.contenders(), contest)) break;
     }
     return now;
+  }
+
+  /// Whether one law without a name does what the names so far do not.
+  bool imitates(const FittedMachine& now) {
+    const double all = rules_.excess(result_.base.held_out);
+    if (now.added.empty() || rules_.excess(now.held_out) < kMostLeft * all) return false;
+    if (!result_.law_alone && go("looking for a law without a name", 0))
+      result_.law_alone =
+          best_law(evidence_, result_.base, doubt_of(options_, {}, rules_.base_of), options_);
+    if (!result_.law_alone) return false;
+    const double gain = result_.law_alone->gain, named = result_.base.held_out - now.held_out;
+    const bool many = now.added.size() >= kImitation;
+    return gain > (1 - kMostLeft) * all ||
+           (gain > kMostLeft * all && gain > (many ? 1 : 2) * named);
   }
 
   /// Other ways to begin, where the best one explains most but not all: of two effects, the one
@@ -209,12 +226,7 @@ class Search {
   /// where that costs little.
   void hold_again(FittedMachine& m) {
     for (std::size_t i = m.released.size(); i-- > 0;) {
-      FittedMachine held = m;
-      held.released.erase(held.released.begin() + static_cast<std::ptrdiff_t>(i));
-      for (FreedNumber& n : held.nuisances.numbers)
-        for (const FreedNumber& base : result_.base.nuisances.numbers)
-          if (n.number.key == m.released[i] && base.number.key == m.released[i])
-            n.tolerance = base.tolerance;
+      FittedMachine held = m.holding(m.released[i], result_.base);
       const Ground ground(evidence_, held.residual, held.linear());
       if (ground.held_out - m.held_out > options_.release_gain) continue;
       held.held_out = ground.held_out;

@@ -9,6 +9,10 @@
 //     exchange               each one taken out, all candidates compete for its place
 //   begin otherwise          where much is left: with another of the first contenders
 //
+// Where names leave more than a tenth, a law without a name (generic_laws.hpp) is fitted alone. The
+// search ends where that leaves less than a tenth, explains twice as much as the names (or as much
+// as three of them) or more: nothing in the library is the cause, more names would only imitate it.
+//
 // A gain is chi-square on held-out laps (whose expectation is their number of samples when nothing
 // but noise is left) and of the priors of the declared numbers. It must exceed 25 and 2 % of the
 // excess, and be found under two conditions if the effect shows under two. Candidates that do as
@@ -22,6 +26,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +34,7 @@
 #include "diagnosis/search/diagnosis_options.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/fitted_machine.hpp"
+#include "diagnosis/search/generic_laws.hpp"
 #include "diagnosis/search/screening.hpp"
 
 namespace vcnc {
@@ -53,6 +59,7 @@ struct SelectionResult {
   std::vector<LadderStep> ladder;  ///< one per addition
   std::vector<TrialColumns> trials;
   std::vector<double> release_limits;  ///< of the nuisances of `base`
+  std::optional<LawFit> law_alone;     ///< of `base`, where it was looked for
   bool interrupted = false;
 };
 
