@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "diagnosis/findings.hpp"
+#include "diagnosis/search/chatter_search.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/period_slip_search.hpp"
 
@@ -44,12 +45,18 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
                     const DifferentialRecord* difference, DiagnosisOptions options,
                     const KeepGoing& keep_going) {
   Machine declared = of.declared;
-  std::optional<PeriodSlip> slip;
+  FoundBeforehand before;
   if (declared.effects.get<PeriodSlip>().null())
-    slip = find_period_slip(raw, of.replica.channels(), of.replica.predict(declared),
-                            declared.probe.signal_period);
-  if (slip) declared.effects.get<PeriodSlip>() = *slip;
+    before.slip = find_period_slip(raw, of.replica.channels(), of.replica.predict(declared),
+                                   declared.probe.signal_period);
+  if (before.slip) declared.effects.get<PeriodSlip>() = *before.slip;
   Evidence evidence(of.record, of.replica, declared, difference ? difference->noise_scale : 1);
+  before.chatter = find_chatter(evidence, declared, of.candidates,
+                                difference ? difference->lines : std::vector<NoiseLine>{});
+  for (const Chatter& c : before.chatter) {
+    evidence.leave_out_drive(c.axis);
+    options.vibrating.push_back(c.axis);
+  }
   if (difference) {
     options.max_effects = std::min(options.max_effects, kMostChanges);
     options.form_of_channel = forms_of(evidence, *difference);
@@ -63,7 +70,8 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
   options.share_of_found = kShareOfFound;
   SelectionResult selection =
       select_effects_of(evidence, declared, of.candidates, options, keep_going);
-  return findings_of(of, evidence, options, std::move(selection), slip, difference != nullptr);
+  return findings_of(of, evidence, options, std::move(selection), std::move(before),
+                     difference != nullptr);
 }
 
 }  // namespace

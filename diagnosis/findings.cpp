@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "diagnosis/replica/model_comparison.hpp"
 #include "diagnosis/search/consequence.hpp"
 #include "diagnosis/search/freed_number.hpp"
 #include "diagnosis/search/generic_laws.hpp"
@@ -72,24 +73,15 @@ bool of_measurement(const std::string& effect) {
                   text->family == Family::setup);
 }
 
-std::string channel_name(const ComparedChannel& c) {
-  constexpr const char* kinds[] = {"command", "position", "twist",       "force", "deflection",
-                                   "cosine",  "sine",     "temperature", "clock"};
-  constexpr const char* xyz[] = {"x", "y", "z"};
-  return fmt::format(
-      "{} {}", kinds[static_cast<int>(c.kind)],
-      c.kind == SignalKind::deflection ? xyz[c.axis % 3] : kAxisNames[c.axis].data());
-}
-
 class Report {
  public:
   Report(const DiagnosisCase& of, const Evidence& evidence, const DiagnosisOptions& options,
-         SelectionResult selection, std::optional<PeriodSlip> slip, bool differential)
+         SelectionResult selection, FoundBeforehand before, bool differential)
       : of_(of),
         evidence_(evidence),
         options_(options),
         selection_(std::move(selection)),
-        slip_(slip),
+        before_(std::move(before)),
         floor_(selection_.floor) {
     d_.differential = differential;
     d_.declared = of.declared;
@@ -109,11 +101,12 @@ class Report {
     tell_effects();
     tell_clamping();
     tell_noise_lines();
+    if (!selection_.interrupted) tell_law();
+    tell_chatter();
     std::stable_sort(d_.effects.begin(), d_.effects.end(), [](const auto& a, const auto& b) {
       return a.contour_error_um > b.contour_error_um;
     });
     flag_minor();
-    if (!selection_.interrupted) tell_law();
     tell_excitation();
     tell_figures();
     tell_ladder();
@@ -348,15 +341,16 @@ class Report {
   }
 
   void tell_slip() {
-    if (!slip_) return;
+    if (!before_.slip) return;
+    const PeriodSlip& slip = *before_.slip;
     FoundEffect e;
     e.name = PeriodSlip::text.name;
     e.place = "probe";
     const std::string key = "effects.probe.period_slip.";
-    const double within = evidence_.record().period, n = slip_->periods, channel = slip_->channel;
+    const double within = evidence_.record().period, n = slip.periods, channel = slip.channel;
     e.numbers = {{key + "periods", n, n, n},
                  {key + "channel", channel, channel, channel},
-                 {key + "start_s", slip_->start, slip_->start - within, slip_->start}};
+                 {key + "start_s", slip.start, slip.start - within, slip.start}};
     Machine without = found().machine;
     without.effects.get<PeriodSlip>() = {};
     const Prediction less = evidence_.predict(without);
@@ -370,6 +364,59 @@ class Report {
   double lost(const Prediction& without) const {
     return evidence_.chi2(evidence_.residual(without), Role::held_out) -
            evidence_.chi2(found().residual, Role::held_out);
+  }
+
+  /// What vibrates by itself, and with which effects the model does so, too.
+  void tell_chatter() {
+    for (const Chatter& chatter : before_.chatter) {
+      const std::string_view axis = kAxisNames[chatter.axis];
+      std::string text = fmt::format("{} vibrates by itself: {}", axis, vibration(chatter.line));
+      if (chatter.causes.empty() || !chatter.causes.front().as_strong) {
+        std::string likely;
+        for (const ChatterCause& c : chatter.causes)
+          likely += (likely.empty() ? " So does the model, but not with that strength, with "
+                                    : " or with ") +
+                    of_.candidates[c.candidate].name();
+        if (likely.empty()) likely = fmt::format(" No effect on the drive of {} does so", axis);
+        d_.notes.push_back(text + "." + likely + ".");
+        unnamed_chatter_ = true;
+        continue;
+      }
+      const ChatterCause& cause = chatter.causes.front();
+      const Candidate& candidate = of_.candidates[cause.candidate];
+      d_.notes.push_back(fmt::format(
+          "{}. So does the model with {}: {}. Such a vibration has no phase that repeats, so that "
+          "amplitudes were compared and not samples; what else the drive of {} does was not "
+          "sought.",
+          text, candidate.name(), vibration(cause.line), axis));
+      FoundEffect e;
+      e.name = candidate.effect;
+      e.place = candidate.place;
+      e.gain = std::numeric_limits<double>::quiet_NaN();
+      for (std::size_t i = 1; i < chatter.causes.size(); ++i)
+        e.class_with.push_back(of_.candidates[chatter.causes[i].candidate].name());
+      if (!e.class_with.empty()) e.separating_program = program_for(e.name);
+      const Prediction still = evidence_.predict(d_.found);
+      d_.found = with_candidate(d_.found, candidate, cause.size);
+      const std::string& key = candidate.numbers.front().key;
+      e.numbers = {{key, number_of(d_.found, key), cause.low, cause.high}};
+      e.contour_error_um = consequence(evidence_, evidence_.predict(d_.found), still).contour_um;
+      d_.effects.push_back(std::move(e));
+    }
+  }
+
+  static std::string vibration(const NoiseLine& line) {
+    const ShownUnit unit = shown_unit(line.channel);
+    return fmt::format("{} with {:.2f} Hz and {:.3g} {}", channel_name(line.channel),
+                       line.frequency, line.amplitude * unit.factor, unit.name);
+  }
+
+  /// Whether a line is that of an axis that vibrates by itself.
+  bool is_of_chatter(const NoiseLine& line) const {
+    return std::any_of(before_.chatter.begin(), before_.chatter.end(), [&](const Chatter& c) {
+      return (line.channel.axis == c.axis && line.channel.kind != SignalKind::deflection) ||
+             std::abs(line.frequency - c.line.frequency) < 0.02 * c.line.frequency;
+    });
   }
 
   /// What a number does to the contour by standing where it stands.
@@ -431,16 +478,15 @@ class Report {
               return n.key.ends_with("frequency_Hz") && std::abs(n.value - line.frequency) < 0.5;
             });
           });
-      if (named) continue;
+      if (named || is_of_chatter(line)) continue;
       const bool mains = std::abs(line.frequency - 50) < 0.4 || std::abs(line.frequency - 60) < 0.4;
       const bool probe = line.channel.kind == SignalKind::deflection;
       d_.notes.push_back(fmt::format(
           "{} holds a disturbance of {:.2f} Hz that does not repeat with the laps, amplitude "
-          "{:.3g} "
-          "{}, {:.0f} times the noise around it{}",
+          "{:.3g} {}, {:.0f} times the noise around it{}",
           channel_name(line.channel), line.frequency,
-          line.channel.kind == SignalKind::force ? line.amplitude : line.amplitude * 1e6,
-          line.channel.kind == SignalKind::force ? "N" : "um", line.strength,
+          line.amplitude * shown_unit(line.channel).factor, shown_unit(line.channel).name,
+          line.strength,
           mains   ? " (mains)."
           : probe ? " (vibration between tool and piece)."
                   : "."));
@@ -468,7 +514,7 @@ class Report {
       law = best_law(evidence_, found(),
                      doubt_of(options_, anything ? base : std::vector<double>{}, now), options_);
     // A law that does better than all that was named takes the names away.
-    if (!found().added.empty()) {
+    if (anything) {
       LawFit instead = selection_.law_alone ? *selection_.law_alone
                                             : best_law(evidence_, selection_.base,
                                                        doubt_of(options_, {}, base), options_);
@@ -479,10 +525,12 @@ class Report {
         std::string names;
         for (const AddedEffect& a : found().added)
           names += (names.empty() ? "" : " with ") + of_.candidates[a.candidate].name();
+        for (const std::string& key : found().released)
+          names += (names.empty() ? "" : " with ") + key;
         d_.notes.push_back(fmt::format("It looks like {}, but {} alone fits better.", names,
                                        words_of(instead.law.law)));
         std::erase_if(d_.effects, [](const FoundEffect& e) {
-          return !e.place.empty() && e.place != "setup" && e.name != "deviation";
+          return !e.place.empty() && e.place != "setup" && e.name != PeriodSlip::text.name;
         });
         withdrawn_ = true;
         law = std::move(instead);
@@ -551,9 +599,10 @@ class Report {
   }
 
   void judge() {
-    const double before = excess(
-        slip_ ? evidence_.chi2(evidence_.residual(evidence_.predict(of_.declared)), Role::held_out)
-              : selection_.base.held_out);
+    const double before =
+        excess(before_.slip ? evidence_.chi2(evidence_.residual(evidence_.predict(of_.declared)),
+                                             Role::held_out)
+                            : selection_.base.held_out);
     const FittedMachine& kept = withdrawn_ ? selection_.base : found();
     const double after = excess(kept.held_out);
     const double ratio = 1 + after / std::max(1.0, floor_);
@@ -564,7 +613,7 @@ class Report {
     using enum DiagnosisVerdict;
     if (evidence_.count(Role::held_out) < 200 || (!excited && !named && ratio < kQuiet))
       d_.verdict = not_identifiable;
-    else if (d_.law)
+    else if (d_.law || unnamed_chatter_)
       d_.verdict = named ? partly : unexplained;
     else if (!evidence_.noise().from_repetitions)
       d_.verdict = named ? explained : no_deviation;
@@ -588,10 +637,11 @@ class Report {
   const Evidence& evidence_;
   const DiagnosisOptions& options_;
   SelectionResult selection_;
-  std::optional<PeriodSlip> slip_;
+  FoundBeforehand before_;
   double floor_;
   double law_gain_ = 0;
   bool withdrawn_ = false;
+  bool unnamed_chatter_ = false;
   Diagnosis d_;
 };
 
@@ -599,8 +649,9 @@ class Report {
 
 Diagnosis findings_of(const DiagnosisCase& of, const Evidence& evidence,
                       const DiagnosisOptions& options, SelectionResult selection,
-                      std::optional<PeriodSlip> slip, bool differential) {
-  return Report(of, evidence, options, std::move(selection), slip, differential).write();
+                      FoundBeforehand before, bool differential) {
+  return Report(of, evidence, options, std::move(selection), std::move(before), differential)
+      .write();
 }
 
 }  // namespace vcnc

@@ -21,18 +21,26 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "diagnosis/diagnosis_case.hpp"
 #include "diagnosis/report/diagnosis.hpp"
+#include "diagnosis/search/chatter_search.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/period_slip_search.hpp"
 #include "diagnosis/search/selection.hpp"
 
 namespace vcnc {
 
-/// `slip` is a slip of a period that was found beforehand and is part of every prediction.
+/// What was found before effects were sought: a slip of a period, which is part of every
+/// prediction, and axes that vibrate by themselves, which is of none.
+struct FoundBeforehand {
+  std::optional<PeriodSlip> slip;
+  std::vector<Chatter> chatter;
+};
+
 Diagnosis findings_of(const DiagnosisCase& of, const Evidence& evidence,
                       const DiagnosisOptions& options, SelectionResult selection,
-                      std::optional<PeriodSlip> slip, bool differential);
+                      FoundBeforehand before, bool differential);
 
 }  // namespace vcnc

@@ -72,10 +72,10 @@ std::string effect_box(const FoundEffect& e) {
     text +=
         fmt::format("<tr><td><code>{}</code></td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
                     escaped(n.key), with_interval(n), escaped(unit_of_key(n.key)), interval_bar(n));
-  text += fmt::format(
-      "</table><p>Chi-square gained on what was held out: {:.0f}. Contour error: "
-      "{:+.3g} µm rms.</p>\n",
-      e.gain, e.contour_error_um);
+  text += "</table><p>";
+  if (std::isfinite(e.gain))
+    text += fmt::format("Chi-square gained on what was held out: {:.0f}. ", e.gain);
+  text += fmt::format("Contour error: {:+.3g} µm rms.</p>\n", e.contour_error_um);
   if (!e.class_with.empty()) {
     std::string others;
     for (const std::string& c : e.class_with) others += (others.empty() ? "" : ", ") + escaped(c);

@@ -63,7 +63,7 @@ std::string verdict_sentence(const Diagnosis& d) {
               : "");
     case DiagnosisVerdict::unexplained:
       return d.law ? d.law->words
-                   : std::string("something repeats itself that nothing in the library does");
+                   : std::string("something is there that nothing in the library explains");
     case DiagnosisVerdict::no_deviation:
       return "the machine does what is declared, within what this run can show";
     case DiagnosisVerdict::not_identifiable:

@@ -31,6 +31,8 @@ struct DiagnosisOptions {
   double out_of_tolerance = 4.5;  ///< pull of a declared number
   double release_gain = 25;       ///< of one whose tolerance is lifted, priors included
   double clamped_um = 5;          ///< offset of the piece that is worth a word; 10 urad per um
+  /// Axes that vibrate by themselves: what else their drives do is not sought.
+  std::vector<std::size_t> vibrating;
   std::size_t refits = 5, per_family = 2, pairs_of = 10;
   std::size_t max_effects = 8;
 };

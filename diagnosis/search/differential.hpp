@@ -11,8 +11,11 @@
 // either. The noise of the reference stays in: variances grow by 1 + 1/n for n laps.
 #pragma once
 
+#include <vector>
+
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
+#include "diagnosis/search/noise_audit.hpp"
 #include "model/axes.hpp"
 #include "model/machine.hpp"
 
@@ -22,7 +25,8 @@ struct DifferentialRecord {
   Record record;
   double noise_scale = 1;  ///< of the standard deviation
   PerAxis<double> off{};  ///< RMS of a reading of the probe less yhat in the healthy run, x y z [m]
-  Machine healthy;        ///< what the record is held against instead of the declared machine
+  std::vector<NoiseLine> lines;  ///< what vibrates in the healthy run
+  Machine healthy;  ///< what the record is held against instead of the declared machine
 };
 
 DifferentialRecord less_healthy(const Record& now, const Record& healthy, Replica& of_healthy,

@@ -99,6 +99,15 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
   }
 }
 
+void Evidence::leave_out_drive(std::size_t axis) {
+  for (std::size_t c = 0; c < valid_.size(); ++c) {
+    const ComparedChannel& channel = replica_.channels()[c];
+    if (channel.axis != axis || channel.kind == SignalKind::deflection) continue;
+    std::fill(valid_[c].begin(), valid_[c].end(), 0);
+    fitted_count_[c] = held_out_count_[c] = 0;
+  }
+}
+
 void Evidence::mask_standing() {
   const auto reach = static_cast<std::size_t>(std::round(kReach / record_.period));
   for (std::size_t c = 0; c < raw_valid_.size(); ++c) {

@@ -79,6 +79,8 @@ class Evidence {
   }
   /// See Replica::anchor().
   void anchor(const Machine& machine) { replica_.anchor(machine); }
+  /// From now on what the drive of an axis records counts for nothing. Not after columns were made.
+  void leave_out_drive(std::size_t axis);
   /// W (y - yhat).
   Column residual(const Prediction& prediction) const;
   /// W (changed - base) / step.

@@ -214,6 +214,17 @@ WhiteningFilter fit_autoregression(const std::vector<double>& covariance) {
   return filter;
 }
 
+std::vector<NoiseLine> vibrations(const Record& record, const Partition& partition,
+                                  const ComparedChannel& channel,
+                                  const std::vector<double>& series) {
+  const std::vector<LapNoise> laps = lap_noise(partition, series);
+  return laps.empty() ? std::vector<NoiseLine>{} : find_lines(channel, laps, record.period, 0);
+}
+
+double lap_scatter(const Partition& partition, const std::vector<double>& series) {
+  return std::sqrt(covariances(lap_noise(partition, series))[0]);
+}
+
 NoiseAudit audit_noise(const Record& record, const Partition& partition,
                        const std::vector<ComparedChannel>& channels,
                        const std::vector<std::vector<double>>& residual,

@@ -61,6 +61,14 @@ struct NoiseAudit {
   std::vector<std::string> warnings;
 };
 
+/// The strongest lines of one channel, at most three, where laps of a condition differ.
+std::vector<NoiseLine> vibrations(const Record& record, const Partition& partition,
+                                  const ComparedChannel& channel,
+                                  const std::vector<double>& series);
+
+/// RMS of what laps of a condition differ by; 0 where none is repeated.
+double lap_scatter(const Partition& partition, const std::vector<double>& series);
+
 /// `residual` is one series per channel, NaN where there is nothing to compare; `rounding`
 /// likewise, or empty (Replica::rounding()).
 NoiseAudit audit_noise(const Record& record, const Partition& partition,

@@ -157,15 +157,17 @@ class Search {
                                             options_.out_of_tolerance, options_.release_gain);
   }
 
-  /// A drive whose axis never moves shows nothing of its servo, friction or mechanics.
+  /// A drive whose axis never moves shows nothing of its servo, friction or mechanics; of one that
+  /// vibrates by itself nothing can be compared.
   bool asleep(const Candidate& c) const {
     const auto name = std::find(kAxisNames.begin(), kAxisNames.end(), c.place);
     if (name == kAxisNames.end()) return false;
     const Family family = c.family;
     if (family != Family::servo && family != Family::friction && family != Family::mechanics)
       return false;
-    const MeasuredSignal* command = evidence_.record().find(
-        SignalKind::command, static_cast<std::size_t>(name - kAxisNames.begin()));
+    const auto axis = static_cast<std::size_t>(name - kAxisNames.begin());
+    if (std::count(options_.vibrating.begin(), options_.vibrating.end(), axis) > 0) return true;
+    const MeasuredSignal* command = evidence_.record().find(SignalKind::command, axis);
     if (!command) return false;
     const auto [low, high] = std::minmax_element(command->value.begin(), command->value.end());
     return *high - *low < 1e-9;

@@ -1,0 +1,51 @@
+// Finds what makes an axis vibrate by itself.
+//
+// A limit cycle (play or too much gain within the loop, friction that sticks) has no phase that the
+// laps repeat: to a fit it is noise, and sample by sample nothing can tell what makes it. But the
+// model vibrates too when it has the same fault. So where an axis' own signals hold a strong line
+// that does not repeat, each candidate of its drive is simulated at a few sizes, and the lines of
+// the simulated laps are sought as those of the measured ones (noise_audit.hpp). A candidate is a
+// cause if the axis then vibrates at the measured frequency within a factor of two: frequency and
+// amplitude depend little on the size of a play and much on the stiffness behind it, which nobody
+// declares. So of the size no more is known than that it is among those that do so, and all causes
+// are one class. They explain the vibration where the model also vibrates as strongly, within a
+// factor of three in every signal of the drive; else they are what is likely.
+//
+// Validity: frequencies below half the rate of the record; an axis of which the position or the
+// force is recorded. Limit cycles of play: Nordin & Gutman, Automatica 38 (2002) 1633-1649.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "diagnosis/search/candidate.hpp"
+#include "diagnosis/search/evidence.hpp"
+#include "diagnosis/search/noise_audit.hpp"
+
+namespace vcnc {
+
+/// What makes the model vibrate like the machine.
+struct ChatterCause {
+  std::size_t candidate = 0;
+  double size = 0;           ///< middle of those that do so, in usual ones
+  double low = 0, high = 0;  ///< of its first number, in the unit of the key
+  NoiseLine line;            ///< of the model, the likest
+  bool as_strong = false;    ///< as the machine's, there
+};
+
+struct Chatter {
+  std::size_t axis = 0;
+  NoiseLine line;                    ///< strongest, as measured
+  std::vector<ChatterCause> causes;  ///< the likest first; none: something outside the drive
+};
+
+/// A machine with a candidate: its first number larger by `size` usual ones, the others as usual
+/// where they are nothing.
+Machine with_candidate(Machine machine, const Candidate& candidate, double size);
+
+/// `before`: what vibrated already when the machine was healthy.
+std::vector<Chatter> find_chatter(const Evidence& evidence, const Machine& declared,
+                                  const std::vector<Candidate>& candidates,
+                                  const std::vector<NoiseLine>& before);
+
+}  // namespace vcnc
