@@ -6,6 +6,8 @@
 #include <iterator>
 #include <map>
 #include <numeric>
+#include <set>
+#include <string>
 #include <utility>
 
 #include "diagnosis/search/parallel.hpp"
@@ -18,7 +20,6 @@ constexpr double kUsual = 1;       ///< decades about the typical size
 constexpr double kShows = 0.02;    ///< part of a gain that a channel must have to be concerned
 constexpr double kNothing = 0.03;  ///< of a typical size
 constexpr double kPromise = 0.3;   ///< of what is needed: worth a refit
-constexpr double kBothLaps = 2;    ///< gain on held-out laps per gain on fitted ones, at most
 constexpr double kLeaves = 0.05;   ///< part of what is left that a winner may leave
 constexpr std::size_t kElsewhere = 2;
 constexpr std::size_t kFinalists = 3, kRivals = 4, kMoreRefits = 8;
@@ -153,7 +154,6 @@ std::vector<Contender> Contest::refitted(const std::vector<Screened>& list) cons
   return all;
 }
 
-/// Gains that differ by less are alike when the best is `gain`.
 double Contest::band_of(double gain) const {
   return rules_.options.class_gain +
          rules_.options.class_share * rules_.excess(ground_.held_out - gain) +
@@ -182,6 +182,14 @@ std::vector<Screened> Contest::likes_of(const std::vector<Contender>& all,
 void Contest::put_simplest_first(std::vector<Contender>& all) const {
   if (all.empty()) return;
   const double most = all.front().gain, band = band_of(most);
+  // A number that is never quite absent is one of an effect: where that does as well with all its
+  // numbers, it is told, so that what is known of one of them does not hang on the others'
+  // defaults.
+  std::set<std::string> owned;
+  for (const Contender& e : all)
+    for (const FreedNumber& n : e.numbers)
+      if (e.released.empty() && e.gain > most - band) owned.insert(n.number.key);
+  std::erase_if(all, [&](const Contender& c) { return owned.contains(c.released); });
   // A gain that is less by the band weighs like one number more.
   const auto cost = [&](const Contender& c) { return intricacy(c) + (most - c.gain) / band; };
   auto simplest = all.begin();
@@ -204,13 +212,6 @@ double Contest::intricacy(const Contender& c) const {
       }
   const double unusual = largest > 0 ? std::max(0.0, std::abs(std::log10(largest)) - kUsual) : 0;
   return static_cast<double>(numbers) + 2 * unusual;
-}
-
-/// Of what is left on the laps that are fitted and on those that are held out. What helps the
-/// latter far more makes up for declared numbers that the former leave open: a drift of which they
-/// see one value only.
-double Contest::gain_of(double fitted, double held_out) const {
-  return std::min(ground_.held_out - held_out, kBothLaps * (ground_.fitted - fitted));
 }
 
 Contender Contest::contender(const std::vector<std::size_t>& trials, const Eigen::VectorXd& size,
@@ -237,7 +238,7 @@ Contender Contest::contender(const std::vector<std::size_t>& trials, const Eigen
     c.fit = refit(rules_.evidence, c.begun, c.numbers, without(linear_, c.numbers), kGlance,
                   Begin::far);
     c.numbers = c.fit.live;
-    c.gain = gain_of(c.fit.fitted, c.fit.held_out);
+    c.gain = ground_.held_out - c.fit.held_out;
     const bool first = share == 1.0;
     if (first || c.gain > best.gain) best = std::move(c);
     if (best.gain > 0.5 * promised) break;
@@ -260,7 +261,7 @@ void Contest::finish(std::vector<Contender>& all) const {
     c.converged = true;
     c.fit = refit(rules_.evidence, c.begun, c.numbers, without(linear_, c.numbers));
     c.numbers = c.fit.live;
-    c.gain = gain_of(c.fit.fitted, c.fit.held_out);
+    c.gain = ground_.held_out - c.fit.held_out;
   });
 }
 
@@ -299,7 +300,7 @@ std::vector<Contender> Contest::releases() const {
     Contender c;
     c.released = n.number.key;
     c.numbers = {n};
-    c.gain = gain_of(s.fitted, s.held_out);
+    c.gain = ground_.held_out - s.held_out;
     c.fit.held_out_of = left_after(ground_.grams.held_out_of, s.step);
     all.push_back(std::move(c));
   }

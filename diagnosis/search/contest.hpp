@@ -63,6 +63,8 @@ class Contest {
   /// The candidates but one that may gain `least`, refitted, best first.
   std::vector<Contender> rivals(double least, std::size_t but) const;
 
+  /// Gains that differ by less are alike when the best is `gain`.
+  double band_of(double gain) const;
   double held_out() const { return ground_.held_out; }
 
  private:
@@ -72,7 +74,6 @@ class Contest {
                                  const std::vector<Screened>& screened,
                                  const std::vector<Screened>& list) const;
   std::vector<Contender> refitted(const std::vector<Screened>& list) const;
-  double gain_of(double fitted, double held_out) const;
   Contender contender(const std::vector<std::size_t>& trials, const Eigen::VectorXd& size,
                       double promised) const;
   void finish(std::vector<Contender>& all) const;
@@ -83,7 +84,6 @@ class Contest {
   double intricacy(const Contender& contender) const;
   double counted_gain(const Contender& contender) const;
   bool under_two_conditions(const Contender& contender) const;
-  double band_of(double gain) const;
   std::size_t candidate_of(const Screened& s) const;
 
   const ContestRules& rules_;

@@ -263,19 +263,19 @@ class Search {
   /// Effects that were accepted when others were still missing may be stand-ins: each is taken out
   /// and all candidates compete for its place.
   void exchange(FittedMachine& m) {
-    for (std::size_t i = 0; i < m.added.size() && going_; ++i) {
-      if (m.added.size() < 2) return;
+    std::size_t tries = 2 * m.added.size();
+    for (std::size_t i = 0; i < m.added.size() && m.added.size() > 1 && tries-- > 0 && going_;) {
       const FittedMachine less = taken_out(m, i);
       Contest contest(rules_, less);
       const double lost = contest.held_out() - m.held_out;
       const std::vector<Contender> rivals = contest.rivals(kNearLoss * lost, m.added[i].candidate);
-      const double band = options_.class_gain + options_.class_share * rules_.excess(m.held_out);
       m.added[i].class_with.clear();
       for (const Contender& r : rivals)
-        if (r.gain > std::max(lost - band, 0.5 * lost))
+        if (r.gain > std::max(lost - contest.band_of(lost), 0.5 * lost))
           m.added[i].class_with.push_back(r.candidate);
+      ++i;
       if (rivals.empty() ||
-          rivals.front().worth() < lost - 4 * static_cast<double>(m.added[i].numbers.size()))
+          rivals.front().worth() < lost - 4 * static_cast<double>(m.added[i - 1].numbers.size()))
         continue;
       FittedMachine other = less;
       add(other, rivals.front(), {});
@@ -283,7 +283,8 @@ class Search {
         evidence_.anchor(m.machine);
         continue;
       }
-      m = std::move(other);
+      m = std::move(other);  // the one that came in is the last, so that the next one is here
+      --i;
     }
   }
 

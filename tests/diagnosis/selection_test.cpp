@@ -126,6 +126,67 @@ TEST(Selection, WhatIsFoundIsNotKnownWellEnoughForAnEffectBehindIt) {
   EXPECT_EQ(names(found(0.1), toy::candidates()), "X.load_play");
 }
 
+/// A reading of waves of a lap, each as strong as the number of one effect says [um].
+class WaveReplica : public Replica {
+ public:
+  struct Wave {
+    const char* key;
+    std::vector<double> harmonics;  ///< amplitudes of the third, fourth, ... wave per lap
+  };
+
+  WaveReplica(std::size_t samples, std::vector<Wave> waves)
+      : samples_(samples), waves_(std::move(waves)), channels_{{SignalKind::deflection, 0}} {}
+
+  const std::vector<ComparedChannel>& channels() const override { return channels_; }
+  Prediction predict(const Machine& m) const override {
+    std::vector<double> x(samples_);
+    for (const Wave& w : waves_) {
+      const double um = number_of(m, w.key);
+      for (std::size_t h = 0; h < w.harmonics.size(); ++h)
+        for (std::size_t k = 0; k < samples_; ++k)
+          x[k] += 1e-6 * um * w.harmonics[h] *
+                  std::sin(2 * kPi * static_cast<double>((3 + h) * k) / 1000);
+    }
+    return {x};
+  }
+
+  std::vector<Candidate> candidates() const {
+    std::vector<Candidate> all;
+    for (const Wave& w : waves_) all.push_back({w.key, "", {{w.key, 1, 0, 1000, true}}, {}});
+    return all;
+  }
+
+ private:
+  std::size_t samples_;
+  std::vector<Wave> waves_;
+  std::vector<ComparedChannel> channels_;
+};
+
+TEST(Selection, StandInsForEachOtherAllGo) {
+  // The machine is a + b. "first" alone does more than either; beside it "second" fits better than
+  // b. Then a does better than "first", and only then b better than "second".
+  Record record = toy::commands(1000, 4);
+  WaveReplica replica(record.samples(),
+                      {{"effects.X.load_play.width_um", {1, 0, 0, 0}},      // a
+                       {"effects.Y.load_play.width_um", {0, 1, 0, 0}},      // b
+                       {"effects.Z.load_play.width_um", {1, 0.3, 0.1, 0}},  // first
+                       {"effects.X.lost_motion.compliance_nm_per_N", {0, 1, -0.05, 0.02}}});
+  Machine truth;
+  move_number(truth, "effects.X.load_play.width_um", 1);
+  move_number(truth, "effects.Y.load_play.width_um", 1);
+  std::vector<double> reading = replica.predict(truth)[0];
+  for (std::size_t k = 0; k < reading.size(); ++k)
+    reading[k] += toy::kProbeNoise * gaussian_noise(14, 0, k)[0];
+  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+  Evidence evidence(record, replica, {});
+  const SelectionResult result =
+      select_effects_of(evidence, {}, replica.candidates(), DiagnosisOptions(), {});
+  EXPECT_EQ(result.ladder.front().name, "effects.Z.load_play.width_um");
+  ASSERT_EQ(result.found.added.size(), 2U);
+  EXPECT_NEAR(number_of(result.found.machine, "effects.X.load_play.width_um"), 1, 0.02);
+  EXPECT_NEAR(number_of(result.found.machine, "effects.Y.load_play.width_um"), 1, 0.02);
+}
+
 TEST(FitDeclared, LeavesNoMoreThanTheDeclarationWhateverIsWrong) {
   for (const double wrong : {1e-6, 1e-4, 1e-2}) {
     Record record = toy::commands(500, 4);
