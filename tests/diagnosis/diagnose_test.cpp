@@ -99,6 +99,23 @@ TEST(Diagnose, EndsWhereALawDoesWhatNamesOnlyImitate) {
   }
 }
 
+TEST(Diagnose, AModelWithALawPredictsBetterThanWithout) {
+  // A kink over the own axis: the scale of X, a declared number, goes along with any such law.
+  Record record = measured({}, 46);
+  const std::vector<double>& x = record.find(SignalKind::command, 0)->value;
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::deflection)
+      for (std::size_t k = 0; k < s.value.size(); ++k)
+        s.value[k] += 4e-4 * std::max(0.0, x[k] - 0.01) - 2e-4 * x[k];
+  const Diagnosis d = diagnosed(record);
+  ASSERT_TRUE(d.law);
+  for (const SignalFigure& f : d.figures)
+    if (f.channel.kind == SignalKind::deflection) {
+      EXPECT_GT(f.before, 10 * f.floor);
+      EXPECT_LT(f.after, 3 * f.floor);
+    }
+}
+
 /// The machine of which the probe shows displacements by laws as s tanh(d / s).
 class SaturatingReplica : public toy::ToyReplica {
  public:
@@ -144,7 +161,7 @@ TEST(Diagnose, FitsALawWhereItActs) {
   EXPECT_NEAR(*high, 6e-6, 1.5e-6);
 }
 
-/// The settings of a machine whose moving mass is declared 500 kg with a tolerance of 1 %.
+/// The moving mass is declared as 500 kg with a tolerance of 1 %.
 TEST(Diagnose, TellsADeclaredNumberOutOfToleranceWithItsGain) {
   Machine truth;
   move_number(truth, "axes.X.load_kg", 560);

@@ -126,6 +126,20 @@ TEST(Selection, WhatIsFoundIsNotKnownWellEnoughForAnEffectBehindIt) {
   EXPECT_EQ(names(found(0.1), toy::candidates()), "X.load_play");
 }
 
+TEST(Selection, EndsAtTheMostEffectsThatAreAllowed) {
+  Record record = toy::commands(1000, 4);
+  Machine truth;
+  move_number(truth, "effects.X.load_play.width_um", 2);
+  move_number(truth, "effects.geometry.squareness.xy_urad", 20);
+  toy::measure(record, truth, 15);
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, {});
+  DiagnosisOptions options;
+  options.max_effects = 1;
+  const SelectionResult result = select_effects_of(evidence, {}, toy::candidates(), options, {});
+  EXPECT_EQ(names(result, toy::candidates()), "X.load_play");
+}
+
 /// A reading of waves of a lap, each as strong as the number of one effect says [um].
 class WaveReplica : public Replica {
  public:
