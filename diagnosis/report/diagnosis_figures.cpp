@@ -84,6 +84,54 @@ std::string quoted_label(std::string text) {
   return text;
 }
 
+struct Shown {
+  std::string name, unit;
+  double factor = 1;  ///< from SI
+};
+
+/// A covariate in the units of pages.
+Shown shown_covariate(Covariate of, bool rotary) {
+  const std::string length = rotary ? "deg" : "mm";
+  const double factor = rotary ? 1 / kDegree : 1e3;
+  switch (of) {
+    case Covariate::time:
+      return {"time", "s", 1};
+    case Covariate::position:
+      return {"position", length, factor};
+    case Covariate::velocity:
+      return {"speed", length + "/s", factor};
+    case Covariate::acceleration:
+      return {"acceleration", length + "/s^2", factor};
+    case Covariate::sign:
+      break;
+  }
+  return {"direction", "1", 1};
+}
+
+/// What a law adds, per unit of what it is multiplied by.
+Shown shown_value(const Law& law) {
+  const bool rotary = is_rotary(law.axis_index());
+  Shown y;
+  switch (law.point) {
+    case Law::Point::motor_force:
+    case Law::Point::table_force:
+      y = {"force", rotary ? "N m" : "N", 1};
+      break;
+    case Law::Point::command_time:
+      y = {"time", "us", 1e6};
+      break;
+    case Law::Point::reading:
+      y = {"reading", "um", 1e6};
+      break;
+    case Law::Point::command:
+    case Law::Point::displacement:
+      y = {"displacement", rotary ? "arcsec" : "um", rotary ? 3600 / kDegree : 1e6};
+  }
+  if (law.times == Covariate::time || law.times == Covariate::sign) return y;
+  const Shown per = shown_covariate(law.times, is_rotary(static_cast<std::size_t>(law.times_axis)));
+  return {y.name, y.unit + " per " + per.unit, y.factor / per.factor};
+}
+
 }  // namespace
 
 std::string residual_figure(const Record& record, const ModelResiduals& residuals,
@@ -187,6 +235,29 @@ std::string correlation_figure(const RelatedQuantity& covariate, const ComparedC
   add(a, 0, "after_up", directions ? "after, forwards" : "after", kInk, "7");
   add(a, kBins, "after_down", "after, backwards", kGreen, "6");
   return plot.empty() ? text + "plot 0 notitle\n" : text + "plot " + plot + "\n";
+}
+
+std::string law_figure(const LearnedLaw& learned) {
+  const Law& law = learned.law;
+  const Shown x = shown_covariate(law.over, is_rotary(static_cast<std::size_t>(law.over_axis)));
+  const Shown y = shown_value(law);
+  std::string text = heading(900, 300) + margins(0.17, 0.93) + "$law << EOD\n";
+  for (std::size_t i = 0; i < law.at.size(); ++i)
+    text +=
+        fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}\n", law.at[i] * x.factor, law.value[i] * y.factor,
+                    learned.low[i] * y.factor, learned.high[i] * y.factor);
+  const std::string of =
+      law.over == Covariate::time
+          ? std::string()
+          : fmt::format(" of {}", kAxisNames[static_cast<std::size_t>(law.over_axis)]);
+  return text +
+         fmt::format("EOD\nset xlabel '{}{}  [{}]'\nset ylabel 'f  [{}]' offset 0.5\n", x.name, of,
+                     x.unit, y.unit) +
+         fmt::format(
+             "plot $law using 1:3:4 with filledcurves lc rgb '{}' fs transparent solid 0.3 "
+             "title '95 %', $law using 1:2 with linespoints lc rgb '{}' pt 7 ps 0.6 lw 1.3 "
+             "notitle\n",
+             kOrange, kInk);
 }
 
 std::string ladder_figure(const std::vector<Rung>& ladder) {

@@ -33,6 +33,9 @@ double explained_by(const RelatedQuantity& covariate, const std::vector<double>&
 std::string correlation_figure(const RelatedQuantity& covariate, const ComparedChannel& channel,
                                const std::vector<double>& before, const std::vector<double>& after);
 
+/// The curve of a learned law with its 95 % band.
+std::string law_figure(const LearnedLaw& law);
+
 /// Held-out chi-square after each added effect.
 std::string ladder_figure(const std::vector<Rung>& ladder);
 

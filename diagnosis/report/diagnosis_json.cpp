@@ -57,6 +57,8 @@ Json rung(const Rung& r) {
 Json learned(const LearnedLaw& l) {
   return {{"behaves_like", l.words},
           {"share", finite(l.share)},
+          {"at", l.law.at},
+          {"value", l.law.value},
           {"low", l.low},
           {"high", l.high},
           {"not_distinguishable_from", l.not_distinguishable_from}};

@@ -206,18 +206,21 @@ std::string diagnosis_page(const DiagnosisStory& story) {
       kDiagnosisMark, escaped(story.record.source), kPageStyle, kDiagnosisStyle);
   page += fmt::format(
       "<h1>Diagnosis</h1>\n<p class=\"lead\">{}: {:.2f} s at {:.6g} Hz, {} laps; against {} "
-      "({} mode).</p>\n<div class=\"verdict {}\"><b>{}</b><span>{}</span></div>\n",
+      "({}).</p>\n<div class=\"verdict {}\"><b>{}</b><span>{}</span></div>\n",
       escaped(story.record.source), seconds, 1 / story.record.period, story.record.stretches.size(),
       escaped(d.declared.name),
-      d.differential ? "differential: against a healthy run"
-                     : "absolute: against the declared model",
+      d.differential ? "differential: what a healthy run has besides is taken off"
+                     : "absolute: all that differs from the declared model",
       verdict_class(d.verdict), to_string(d.verdict), escaped(verdict_sentence(d)));
   if (!d.effects.empty()) {
     page += "<h2>What was found</h2>\n";
     for (const FoundEffect& e : d.effects) page += effect_box(e);
   }
   if (d.law) {
-    page += "<h2>A law without a name</h2>\n<p>" + escaped(d.law->words) + ".</p>\n";
+    page +=
+        "<h2>A law without a name</h2>\n<p>" + escaped(d.law->words) +
+        fmt::format(", which takes {:.0f} % of what is otherwise left.</p>\n", 100 * d.law->share) +
+        figure(law_figure(*d.law), "f, as it was learned, with the band of 95 %.");
     if (!d.law->not_distinguishable_from.empty()) {
       page += "<p>This run cannot tell it from:";
       for (const std::string& n : d.law->not_distinguishable_from)

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <set>
 
 #include "diagnosis/search/screening.hpp"
+#include "model/axes.hpp"
 
 namespace vcnc {
 namespace {
@@ -95,17 +98,52 @@ void stay(const Evidence& evidence, FittedMachine& m) {
   m.held_out = Ground(evidence, m.residual, m.linear()).held_out;
 }
 
-void linearise_nuisances(const Evidence& evidence, FittedMachine& m) {
-  m.nuisances.columns = columns_of(evidence, m.machine, m.prediction, m.nuisances.numbers);
+/// "effects.X.coulomb.level_N", "axes.X.load_kg": X.
+std::string place_of(const std::string& key) {
+  const std::size_t from = key.find('.') + 1;
+  return key.substr(from, key.find('.', from) - from);
 }
 
-/// Takes sensitivities where the machine stands and fits, until that changes nothing.
-void fit_in_rounds(const Evidence& evidence, FittedMachine& m) {
+/// Declared numbers whose sensitivities are others than those of the declared machine: not those of
+/// a drive at which nothing was found.
+std::vector<std::size_t> concerned(const FittedMachine& m) {
+  std::set<std::string> places;
+  for (const FreedNumber& n : m.numbers()) places.insert(place_of(n.number.key));
+  for (const std::string& key : m.released) places.insert(place_of(key));
+  std::vector<std::size_t> all;
+  for (std::size_t i = 0; i < m.nuisances.numbers.size(); ++i) {
+    const std::string place = place_of(m.nuisances.numbers[i].number.key);
+    const bool of_drive =
+        std::find(kAxisNames.begin(), kAxisNames.end(), place) != kAxisNames.end();
+    if (!of_drive || places.contains(place)) all.push_back(i);
+  }
+  return all;
+}
+
+std::vector<std::size_t> every(const FittedMachine& m) {
+  std::vector<std::size_t> all(m.nuisances.numbers.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return all;
+}
+
+/// Takes the sensitivities of some declared numbers where the machine stands.
+void linearise(const Evidence& evidence, FittedMachine& m, const std::vector<std::size_t>& which) {
+  std::vector<FreedNumber> numbers;
+  for (const std::size_t i : which) numbers.push_back(m.nuisances.numbers[i]);
+  std::vector<Column> columns = columns_of(evidence, m.machine, m.prediction, numbers);
+  m.nuisances.columns.resize(m.nuisances.numbers.size());
+  for (std::size_t i = 0; i < which.size(); ++i)
+    m.nuisances.columns[which[i]] = std::move(columns[i]);
+}
+
+/// Takes sensitivities of `which` where the machine stands and fits, until that changes nothing.
+void fit_in_rounds(const Evidence& evidence, FittedMachine& m,
+                   const std::vector<std::size_t>& which) {
   constexpr int kLinearisations = 3;
   constexpr double kSettled = 5;  // chi-square that no further one is worth
   for (int round = 0; round < kLinearisations; ++round) {
     const double before = m.held_out;
-    linearise_nuisances(evidence, m);
+    linearise(evidence, m, which);
     converge(evidence, m);
     if (before - m.held_out < kSettled) break;
   }
@@ -172,7 +210,7 @@ FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
   m.machine = declared;
   m.nuisances.numbers = std::move(numbers);
   m.prediction = evidence.predict(declared);
-  linearise_nuisances(evidence, m);
+  linearise(evidence, m, every(m));
   // What the run cannot show stays at its declaration.
   LinearPart shown;
   for (std::size_t i = 0; i < m.nuisances.numbers.size(); ++i) {
@@ -184,13 +222,13 @@ FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
   converge(evidence, m);
   evidence.anchor(m.machine);
   converge(evidence, m);
-  fit_in_rounds(evidence, m);
+  fit_in_rounds(evidence, m, every(m));
   return m;
 }
 
 void settle_in(Evidence& evidence, FittedMachine& m) {
   evidence.anchor(m.machine);
-  fit_in_rounds(evidence, m);
+  fit_in_rounds(evidence, m, concerned(m));
   const bool far =
       std::any_of(m.nuisances.numbers.begin(), m.nuisances.numbers.end(),
                   [](const FreedNumber& n) { return std::abs(n.pull()) > kPulledFar; });
@@ -201,7 +239,7 @@ void settle_in(Evidence& evidence, FittedMachine& m) {
     anew.machine = with(anew.machine, anew.nuisances.numbers);
     evidence.anchor(anew.machine);
     stay(evidence, anew);
-    fit_in_rounds(evidence, anew);
+    fit_in_rounds(evidence, anew, every(anew));
     if (anew.held_out < m.held_out + kNoStep) m = std::move(anew);
   }
   evidence.anchor(m.machine);

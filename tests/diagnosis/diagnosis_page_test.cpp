@@ -71,6 +71,27 @@ TEST(DiagnosisText, BeginsWithTheVerdictAndHasNumbersWithIntervals) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
 }
 
+TEST(LawFigure, DrawsTheCurveWithItsBandInTheUnitsOfPages) {
+  LearnedLaw learned;
+  learned.law.point = Law::Point::displacement;
+  learned.law.over = Covariate::velocity;
+  learned.law.over_axis = Law::OfAxis::C;
+  learned.law.at = {-0.1, 0.1};
+  learned.law.value = {-2e-6, 3e-6};
+  learned.low = {-2.5e-6, 2e-6};
+  learned.high = {-1.5e-6, 4e-6};
+  const std::string text = law_figure(learned);
+  for (const char* part :
+       {"-5.72958 -2 -2.5 -1.5", "5.72958 3 2 4", "speed of C  [deg/s]", "f  [um]"})
+    EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+  learned.law.point = Law::Point::table_force;  // N per m of the position of X: N per mm
+  learned.law.times = Covariate::position;
+  learned.law.value = {5000, 5000};
+  const std::string spring = law_figure(learned);
+  EXPECT_NE(spring.find("-5.72958 5 "), std::string::npos) << spring;
+  EXPECT_NE(spring.find("f  [N per mm]"), std::string::npos) << spring;
+}
+
 TEST(DiagnosisText, DigitsFollowTheInterval) {
   EXPECT_EQ(with_interval({"k", 1234.5678, 1200, 1270}), "1235 [1200 .. 1270]");
   EXPECT_EQ(with_interval({"k", 0.0123456, 0.0121, 0.0126}), "0.01235 [0.01210 .. 0.01260]");
