@@ -302,6 +302,26 @@ LinearLaw fit(const Evidence& evidence, const Ground& ground, const std::vector<
   return law;
 }
 
+/// A machine by hypothesis and what it leaves of chi-square on the fitted laps.
+struct Settled {
+  Machine machine;
+  double fitted = 0;
+};
+
+/// A machine with the numbers that go along with its law moved, where that is for the better: a law
+/// of the position and a constant may be large and cancel.
+Settled settle(const Evidence& evidence, const Machine& machine, const Ground& at,
+               const LinearPart& linear) {
+  const LinearStep s = linear_step(at.grams.fitted, at.grams.held_out, at.precision, at.offset);
+  std::vector<FreedNumber> numbers = linear.numbers;
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    numbers[i].value += s.step[static_cast<Eigen::Index>(i)] * numbers[i].number.typical;
+  Machine moved = with(machine, numbers);
+  const double before = at.grams.fitted(0, 0),
+               after = evidence.chi2(evidence.residual(evidence.predict(moved)), Role::fitted);
+  return after < before ? Settled{std::move(moved), after} : Settled{machine, before};
+}
+
 /// A law where it acts, in the loop.
 struct Acting {
   Law law;
@@ -309,13 +329,15 @@ struct Acting {
   Prediction prediction;
   Column residual;
   Ground ground;
+  Settled settled;
 
   Acting(const Evidence& evidence, const Machine& without, Law own, const LinearPart& linear)
       : law(std::move(own)),
         machine(with(without, law)),
         prediction(evidence.predict(machine)),
         residual(evidence.residual(prediction)),
-        ground(evidence, residual, linear) {}
+        ground(evidence, residual, linear),
+        settled(settle(evidence, machine, ground, linear)) {}
 
   Acting(const Acting&) = delete;  // the ground refers to the residual
 
@@ -352,27 +374,14 @@ Eigen::VectorXd refine(const Evidence& evidence, const Machine& without, const L
       for (std::size_t h = 0; h < law.value.size(); ++h)
         law.value[h] += share * fitted.value[static_cast<Eigen::Index>(h)];
       auto next = std::make_unique<Acting>(evidence, without, law, linear);
-      if (!(next->ground.fitted < acting.ground.fitted)) continue;
-      better = next->ground.fitted < kWorthARound * acting.ground.fitted;
+      if (!(next->settled.fitted < acting.settled.fitted)) continue;
+      better = next->settled.fitted < kWorthARound * acting.settled.fitted;
       best = std::move(next);
       break;
     }
     if (!better) break;
   }
   return fitted.sigma;
-}
-
-/// A machine with the numbers that go along with its law moved, where that is for the better: a law
-/// of the position and a constant may be large and cancel.
-Machine settled(const Evidence& evidence, const Machine& machine, const Ground& at,
-                const LinearPart& linear) {
-  const LinearStep s = linear_step(at.grams.fitted, at.grams.held_out, at.precision, at.offset);
-  std::vector<FreedNumber> numbers = linear.numbers;
-  for (std::size_t i = 0; i < numbers.size(); ++i)
-    numbers[i].value += s.step[static_cast<Eigen::Index>(i)] * numbers[i].number.typical;
-  Machine moved = with(machine, numbers);
-  const double after = evidence.chi2(evidence.residual(evidence.predict(moved)), Role::fitted);
-  return after < at.grams.fitted(0, 0) ? moved : machine;
 }
 
 }  // namespace
@@ -441,8 +450,8 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
   best.gain = counted_of(*acting);
   best.law.words = "behaves like " + words_of(law);
   best.law.share = std::min(1.0, best.gain / excess);
-  acting->machine.effects.laws.back() = law;
-  best.machine = settled(evidence, acting->machine, acting->ground, linear);
+  best.machine = acting->settled.machine;
+  best.machine.effects.laws.back() = law;
   const double band = options.class_gain + options.class_share * excess;
   for (const std::size_t i : order)
     if (fits[i].gain > fits[order.front()].gain - band &&
