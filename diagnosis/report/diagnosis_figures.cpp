@@ -17,6 +17,8 @@ namespace {
 using namespace figure_style;
 
 constexpr int kBins = 30;
+/// Lower edge of a plot 300 high: with less room gnuplot leaves out what its axis is.
+constexpr double kUnder = 0.21;
 
 Envelope envelope_of(const std::vector<double>& value, double begin, double period) {
   Envelope e(begin, begin + static_cast<double>(value.size()) * period, 1200);
@@ -216,7 +218,7 @@ std::string correlation_figure(const RelatedQuantity& covariate, const ComparedC
   const ShownUnit unit = shown_unit(channel);
   const BinnedMeans b = binned(covariate, before), a = binned(covariate, after);
   std::string text =
-      heading(900, 300) + margins(0.17, 0.93) + means_block("up", b, 0, unit.factor) +
+      heading(900, 300) + margins(kUnder, 0.93) + means_block("up", b, 0, unit.factor) +
       means_block("down", b, kBins, unit.factor) + means_block("after_up", a, 0, unit.factor) +
       means_block("after_down", a, kBins, unit.factor) +
       fmt::format("set xlabel '{} [{}]'\nset ylabel '{} [{}]' offset 0.5\n",
@@ -241,7 +243,8 @@ std::string law_figure(const LearnedLaw& learned) {
   const Law& law = learned.law;
   const Shown x = shown_covariate(law.over, is_rotary(static_cast<std::size_t>(law.over_axis)));
   const Shown y = shown_value(law);
-  std::string text = heading(900, 300) + margins(0.17, 0.93) + "$law << EOD\n";
+  std::string text = heading(900, 300) + margins(kUnder, 0.88) +
+                     "set key at graph 1,graph 1.17 noopaque\n$law << EOD\n";
   for (std::size_t i = 0; i < law.at.size(); ++i)
     text +=
         fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}\n", law.at[i] * x.factor, law.value[i] * y.factor,

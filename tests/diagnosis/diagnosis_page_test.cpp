@@ -127,7 +127,10 @@ TEST(ExplainedBy, FindsWhatAResidualGoesAlongWith) {
 
 TEST(DiagnosisPage, TellsTheStoryInPicturesAndIsSelfContained) {
   const Record record = swinging();
-  const Diagnosis d = found_backlash();
+  Diagnosis d = found_backlash();
+  d.law.emplace();
+  d.law->law.over = Covariate::velocity;
+  d.law->law.at = d.law->low = d.law->high = d.law->law.value = {0, 1};
   ModelResiduals residuals;
   residuals.channels = {{SignalKind::position, kX}};
   residuals.before.emplace_back();
@@ -140,7 +143,9 @@ TEST(DiagnosisPage, TellsTheStoryInPicturesAndIsSelfContained) {
   EXPECT_EQ(page.find("<!DOCTYPE html>\n" + std::string(kDiagnosisMark) + "\n"), 0u);
   for (const char* part : {"PARTLY", "backlash", "5.03 [4.91 .. 5.15]", "What it goes along with",
                            "position X", "One effect after the other", "not excited",
-                           "vcnc program rotary", "test &lt;run&gt;", "25 samples are missing"})
+                           "vcnc program rotary", "test &lt;run&gt;", "25 samples are missing",
+                           // What gnuplot leaves out where it finds no room for it.
+                           ">speed of X  [mm/s]<", ">f  [N]<", ">position X [mm]<"})
     EXPECT_NE(page.find(part), std::string::npos) << part;
   EXPECT_EQ(page.find("src="), std::string::npos);
 }
