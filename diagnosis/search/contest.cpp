@@ -18,6 +18,7 @@ namespace {
 constexpr int kGlance = 4;         ///< iterations to see what a candidate is worth
 constexpr double kUsual = 1;       ///< decades about the typical size
 constexpr double kShows = 0.02;    ///< part of a gain that a channel must have to be concerned
+constexpr double kChance = 3;      ///< standard deviations of a sum of squares
 constexpr double kNothing = 0.03;  ///< of a typical size
 constexpr double kPromise = 0.3;   ///< of what is needed: worth a refit
 constexpr double kLeaves = 0.05;   ///< part of what is left that a winner may leave
@@ -28,6 +29,17 @@ constexpr std::size_t kFinalists = 3, kRivals = 4, kMoreRefits = 8;
 double threshold_of(const DiagnosisOptions& options, double left) {
   return std::max({options.least_gain, options.least_share * left,
                    options.share_of_form * std::min(left, options.form)});
+}
+
+/// Channels where the residual loses something that goes from `before` to `after`.
+std::vector<std::size_t> shown_in(const std::vector<double>& before,
+                                  const std::vector<double>& after) {
+  double gain = 0;
+  for (std::size_t c = 0; c < before.size(); ++c) gain += std::max(0.0, before[c] - after[c]);
+  std::vector<std::size_t> channels;
+  for (std::size_t c = 0; c < before.size(); ++c)
+    if (before[c] - after[c] > kShows * gain) channels.push_back(c);
+  return channels;
 }
 
 void sort_by_worth(std::vector<Contender>& all) {
@@ -45,11 +57,21 @@ double ContestRules::threshold(double held_out) const {
 
 double ContestRules::threshold(const std::vector<double>& before,
                                const std::vector<double>& after) const {
-  double gain = 0, left = 0;
-  for (std::size_t c = 0; c < before.size(); ++c) gain += std::max(0.0, before[c] - after[c]);
-  for (std::size_t c = 0; c < before.size(); ++c)
-    if (before[c] - after[c] > kShows * gain) left += std::max(0.0, before[c] - floor_of[c]);
+  double left = 0;
+  for (const std::size_t c : shown_in(before, after))
+    left += std::max(0.0, before[c] - floor_of[c]);
   return threshold_of(options, left);
+}
+
+bool ContestRules::stands_out(const std::vector<double>& before,
+                              const std::vector<double>& after) const {
+  double gain = 0, above = 0, samples = 0;
+  for (const std::size_t c : shown_in(before, after)) {
+    gain += before[c] - after[c];
+    above += before[c] - evidence.scatter(c, Role::held_out);
+    samples += evidence.count(c, Role::held_out);
+  }
+  return above + kChance * std::sqrt(2 * samples) > 0.5 * gain;
 }
 
 Contest::Contest(const ContestRules& rules, const FittedMachine& now)
@@ -77,7 +99,8 @@ std::vector<Contender> Contest::contenders() {
     c.needed = c.released.empty() ? rules_.threshold(ground_.held_out_of, c.fit.held_out_of)
                                   : rules_.options.release_gain;
   std::erase_if(all, [&](const Contender& c) {
-    return c.gain <= c.needed || counted_gain(c) <= c.needed ||
+    return c.gain <= c.needed || counts(c.gain, c.fit.held_out_of) <= c.needed ||
+           !rules_.stands_out(ground_.held_out_of, c.fit.held_out_of) ||
            (c.released.empty() && !under_two_conditions(c));
   });
   sort_by_worth(all);
@@ -307,8 +330,8 @@ std::vector<Contender> Contest::releases() const {
   return all;
 }
 
-double Contest::counted_gain(const Contender& c) const {
-  return counted(c.gain, ground_.held_out_of, c.fit.held_out_of, doubt_);
+double Contest::counts(double gain, const std::vector<double>& after) const {
+  return counted(gain, ground_.held_out_of, after, doubt_);
 }
 
 /// Held-out gain per condition: an effect that shows under several must help under two.
@@ -366,7 +389,9 @@ void Contest::look_ahead(const std::vector<Screened>& screened, std::vector<Cont
   const std::size_t other = pairs[static_cast<std::size_t>(best - together.begin())].second;
   Contender c = contender({best->trial, screened[other].trial}, best->size, best->gain);
   c.needed = rules_.threshold(ground_.held_out_of, c.fit.held_out_of);
-  if (counted_gain(c) > single + least) all.insert(all.begin(), std::move(c));
+  if (counts(c.gain, c.fit.held_out_of) > single + least &&
+      rules_.stands_out(ground_.held_out_of, c.fit.held_out_of))
+    all.insert(all.begin(), std::move(c));
 }
 
 }  // namespace vcnc

@@ -50,6 +50,9 @@ struct ContestRules {
   /// The same of one that takes the channels from `before` to `after`: only what is left where it
   /// gains something is its concern.
   double threshold(const std::vector<double>& before, const std::vector<double>& after) const;
+  /// Whether what it explains is there at all: whatever repeats makes the residual larger than what
+  /// laps differ by.
+  bool stands_out(const std::vector<double>& before, const std::vector<double>& after) const;
 };
 
 class Contest {
@@ -66,6 +69,8 @@ class Contest {
   /// Gains that differ by less are alike when the best is `gain`.
   double band_of(double gain) const;
   double held_out() const { return ground_.held_out; }
+  /// What counts of a gain that leaves `after` (counted_gain.hpp).
+  double counts(double gain, const std::vector<double>& after) const;
 
  private:
   std::vector<Screened> best_of_each(const std::vector<Screened>& trials) const;
@@ -82,7 +87,6 @@ class Contest {
   void look_ahead(const std::vector<Screened>& screened, std::vector<Contender>& all) const;
   void put_simplest_first(std::vector<Contender>& all) const;
   double intricacy(const Contender& contender) const;
-  double counted_gain(const Contender& contender) const;
   bool under_two_conditions(const Contender& contender) const;
   std::size_t candidate_of(const Screened& s) const;
 

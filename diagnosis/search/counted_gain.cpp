@@ -29,7 +29,8 @@ Doubt doubt_of(const DiagnosisOptions& options, const std::vector<double>& befor
   Doubt doubt(left.size(), 0.0);
   const double wrong = before.empty() ? 0 : wrong_by(options.share_of_found, before, left);
   for (std::size_t c = 0; c < left.size(); ++c) {
-    if (!before.empty()) doubt[c] += wrong * std::max(0.0, before[c] - left[c]);
+    if (!before.empty())
+      doubt[c] += wrong * std::max(0.0, before[c] - left[c]) + std::max(0.0, left[c] - before[c]);
     if (!form.empty()) doubt[c] += options.taken_of_form * form[c];
   }
   return doubt;

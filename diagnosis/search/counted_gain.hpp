@@ -3,7 +3,8 @@
 // A model that gets the healthy machine wrong by some chi-square in a channel, or what it has
 // explained there, may gain a part of that by an effect that is not there. So of a gain in a
 // channel only that counts which exceeds such a part. A law that leaves next to nothing in the
-// channel where it explains most has been seen to be right, and is doubted less everywhere.
+// channel where it explains most has been seen to be right, and is doubted less everywhere. What a
+// law brought into a channel where nothing was is no gain of the next one that takes it out again.
 #pragma once
 
 #include <vector>

@@ -17,6 +17,9 @@ constexpr double kReach = 0.025;                                      // [s]
 /// Readings are rough where their second differences in that reach are as large, of the usual.
 constexpr double kRough = 8;
 constexpr double kSlowSliding = 20e-3;  // [m/s]
+/// A ball that is deflected by less is free; readings so soon before and after it touches depend
+/// on where exactly the piece lies.
+constexpr double kFree = 1e-6, kTouching = 0.05;  // [m], [s]
 
 /// sum of a b, in doubles and several at a time.
 double dot(const float* a, const float* b, std::size_t n) {
@@ -28,6 +31,35 @@ double dot(const float* a, const float* b, std::size_t n) {
       sum[j] += static_cast<double>(a[k + j]) * static_cast<double>(b[k + j]);
   for (; k < n; ++k) sum[0] += static_cast<double>(a[k]) * static_cast<double>(b[k]);
   return ((sum[0] + sum[4]) + (sum[1] + sum[5])) + ((sum[2] + sum[6]) + (sum[3] + sum[7]));
+}
+
+constexpr double kShift = 10e-6;  // to see what one does [m]
+
+/// The piece shifted in x, y, z.
+std::vector<Machine> with_piece_shifted(const Machine& machine) {
+  std::vector<Machine> all;
+  for (const char* key :
+       {"effects.setup.piece_offset.shift_um.x", "effects.setup.piece_offset.shift_um.y",
+        "effects.setup.piece_offset.shift_um.z"}) {
+    all.push_back(machine);
+    move_number(all.back(), key, number_of(machine, key) + kShift * 1e6);
+  }
+  return all;
+}
+
+/// The tool centre shifted along X, Y, Z.
+std::vector<Machine> with_axes_shifted(const Machine& machine) {
+  std::vector<Machine> all;
+  for (const Law::OfAxis axis : {Law::OfAxis::X, Law::OfAxis::Y, Law::OfAxis::Z}) {
+    Law shift;
+    shift.axis = axis;
+    shift.point = Law::Point::displacement;
+    shift.at = {0, 1};
+    shift.value = {kShift, kShift};
+    all.push_back(machine);
+    all.back().effects.laws.push_back(std::move(shift));
+  }
+  return all;
 }
 
 }  // namespace
@@ -54,8 +86,12 @@ Column less(const Column& z, const std::vector<Column>& columns, const Eigen::Ve
 }
 
 Evidence::Evidence(const Record& record, Replica& replica, const Machine& declared,
-                   double noise_scale)
-    : record_(record), replica_(replica), gathering_(replica), partition_(vcnc::partition(record)) {
+                   const MoreNoise& more)
+    : record_(record),
+      replica_(replica),
+      gathering_(replica),
+      partition_(vcnc::partition(record)),
+      lap_scatter_(Eigen::Vector3d::Zero()) {
   const std::vector<ComparedChannel>& channels = replica.channels();
   declared_ = replica.predict(declared);
   for (std::size_t c = 0; c < channels.size(); ++c) {
@@ -67,19 +103,33 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
       raw_valid_[c][k] = std::isfinite(measured_[c][k]) && std::isfinite(declared_[c][k]);
   }
   mask_standing();
+  mask_touching();
   mask_turning_drag();
 
   SeriesOfChannels difference = measured_;
   for (std::size_t c = 0; c < channels.size(); ++c)
-    for (std::size_t k = 0; k < difference[c].size(); ++k)
-      difference[c][k] = raw_valid_[c][k] ? measured_[c][k] - declared_[c][k] : kMissing;
-  take_out_shifts(declared, difference);
+    for (std::size_t k = 0; k < difference[c].size(); ++k) difference[c][k] -= declared_[c][k];
+  mask(difference);
   SeriesOfChannels rounding = replica.rounding(declared);
-  for (std::size_t c = 0; c < rounding.size(); ++c)
-    for (std::size_t k = 0; k < rounding[c].size(); ++k)
-      if (!raw_valid_[c][k]) rounding[c][k] = kMissing;
+  mask(rounding);
+  const std::vector<Stretch>& laps = partition_.stretches;
+  const std::vector<SeriesOfChannels> per_shift = readings_per_shift(with_piece_shifted(declared));
+  Eigen::Vector3d shift = more.shift;
+  if (!per_shift.empty()) {
+    lap_scatter_ = scatter_of(laps, lap_shifts(laps, per_shift, difference));
+    if (!rounding.empty())
+      shift =
+          (shift.array().square() + rms_of(lap_shifts(laps, per_shift, rounding)).array().square())
+              .sqrt();
+    // A piece or an axis that drifts from lap to lap is no noise of the samples.
+    if (partition_.repeated) {
+      std::vector<SeriesOfChannels> either = readings_per_shift(with_axes_shifted(declared));
+      either.insert(either.end(), per_shift.begin(), per_shift.end());
+      take_out_shifts(laps, either, difference);
+    }
+  }
   noise_ = audit_noise(record, partition_, channels, difference, rounding);
-  for (ChannelNoise& channel : noise_.channels) channel.filter.scale *= noise_scale;
+  for (ChannelNoise& channel : noise_.channels) channel.filter.scale *= more.scale;
 
   for (std::size_t c = 0; c < channels.size(); ++c) {
     valid_.emplace_back(record.samples(), 0);
@@ -97,6 +147,17 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
       }
     }
   }
+  if (per_shift.empty() || shift.isZero()) return;
+  std::vector<Column::Channels> of_shifts;
+  for (std::size_t j = 0; j < per_shift.size(); ++j) {
+    Column::Channels& column = of_shifts.emplace_back(channels.size());
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      std::vector<double> change = per_shift[j][c];
+      for (double& d : change) d *= shift[static_cast<Eigen::Index>(j)];
+      if (!change.empty() && keep_comparable(c, change)) column[c] = whiten(c, change);
+    }
+  }
+  of_shifts_ = ShiftWhitening(laps, of_shifts);
 }
 
 void Evidence::leave_out_drive(std::size_t axis) {
@@ -124,6 +185,24 @@ void Evidence::mask_standing() {
       if (std::abs(q[k] - q[before]) < slow || std::abs(q[after] - q[k]) < slow)
         raw_valid_[c][k] = 0;
     }
+  }
+}
+
+void Evidence::mask_touching() {
+  const auto reach = static_cast<std::size_t>(std::round(kTouching / record_.period));
+  const std::size_t n = record_.samples();
+  std::vector<std::size_t> readings;
+  for (std::size_t c = 0; c < raw_valid_.size(); ++c)
+    if (replica_.channels()[c].kind == SignalKind::deflection) readings.push_back(c);
+  const auto free = [&](std::size_t k) {
+    return std::all_of(readings.begin(), readings.end(),
+                       [&](std::size_t c) { return !(std::abs(declared_[c][k]) > kFree); });
+  };
+  for (std::size_t k = 1; k < n && !readings.empty(); ++k) {
+    if (free(k) == free(k - 1)) continue;
+    for (const std::size_t c : readings)
+      std::fill(raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(k > reach ? k - reach : 0),
+                raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(std::min(n, k + reach)), 0);
   }
 }
 
@@ -164,50 +243,26 @@ void Evidence::mask_turning_drag() {
   }
 }
 
-void Evidence::take_out_shifts(const Machine& declared, SeriesOfChannels& difference) const {
-  constexpr const char* kShifts[] = {"effects.setup.piece_offset.shift_um.x",
-                                     "effects.setup.piece_offset.shift_um.y",
-                                     "effects.setup.piece_offset.shift_um.z"};
-  constexpr double kShift = 10;  // [um]
-  std::vector<std::size_t> readings;
-  for (std::size_t c = 0; c < difference.size(); ++c)
-    if (replica_.channels()[c].kind == SignalKind::deflection) readings.push_back(c);
-  if (readings.empty() || !partition_.repeated) return;
-  std::vector<Machine> shifted;
-  for (const char* key : kShifts) {
-    shifted.push_back(declared);
-    move_number(shifted.back(), key, number_of(declared, key) + kShift);
+std::vector<SeriesOfChannels> Evidence::readings_per_shift(
+    const std::vector<Machine>& shifted) const {
+  const std::vector<ComparedChannel>& channels = replica_.channels();
+  const auto is_reading = [](const ComparedChannel& c) { return c.kind == SignalKind::deflection; };
+  if (std::none_of(channels.begin(), channels.end(), is_reading)) return {};
+  std::vector<SeriesOfChannels> all;
+  for (const Prediction& answer : predict_all(shifted)) {
+    SeriesOfChannels& change = all.emplace_back(channels.size());
+    for (std::size_t c = 0; c < channels.size(); ++c)
+      for (std::size_t k = 0; is_reading(channels[c]) && k < record_.samples(); ++k)
+        change[c].push_back((answer[c][k] - declared_[c][k]) / kShift);
+    mask(change);
   }
-  const std::vector<Prediction> answers = predict_all(shifted);
-  constexpr Eigen::Index kColumns = 6;  // each shift, constant and growing
-  for (const Stretch& lap : partition_.stretches) {
-    const auto row = [&](std::size_t c, std::size_t k) {
-      Eigen::Matrix<double, kColumns, 1> x;
-      const double t =
-          static_cast<double>(k - lap.begin) / static_cast<double>(lap.end - lap.begin);
-      for (Eigen::Index j = 0; j < 3; ++j) {
-        const double d = answers[static_cast<std::size_t>(j)][c][k] - declared_[c][k];
-        x[j] = std::isfinite(d) ? d / kShift : 0;
-        x[3 + j] = x[j] * (t - 0.5);
-      }
-      return x;
-    };
-    Eigen::Matrix<double, kColumns, kColumns> products =
-        Eigen::Matrix<double, kColumns, kColumns>::Zero();
-    Eigen::Matrix<double, kColumns, 1> with_difference = Eigen::Matrix<double, kColumns, 1>::Zero();
-    for (const std::size_t c : readings)
-      for (std::size_t k = lap.begin; k < lap.end; ++k) {
-        if (!raw_valid_[c][k]) continue;
-        const auto x = row(c, k);
-        products += x * x.transpose();
-        with_difference += x * difference[c][k];
-      }
-    products.diagonal().array() += 1e-9 * products.diagonal().maxCoeff() + 1e-300;
-    const Eigen::Matrix<double, kColumns, 1> shift = products.ldlt().solve(with_difference);
-    for (const std::size_t c : readings)
-      for (std::size_t k = lap.begin; k < lap.end; ++k)
-        if (raw_valid_[c][k]) difference[c][k] -= shift.dot(row(c, k));
-  }
+  return all;
+}
+
+void Evidence::mask(SeriesOfChannels& series) const {
+  for (std::size_t c = 0; c < series.size(); ++c)
+    for (std::size_t k = 0; k < series[c].size(); ++k)
+      if (!raw_valid_[c][k]) series[c][k] = kMissing;
 }
 
 Prediction Evidence::predict(const Machine& hypothesis) const {
@@ -256,6 +311,7 @@ Column Evidence::residual(const Prediction& prediction) const {
     }
     column[c] = whiten(c, r);
   }
+  of_shifts_.apply(column);
   return column;
 }
 
@@ -269,6 +325,7 @@ Column Evidence::sensitivity(const Prediction& base, const Prediction& changed, 
     for (std::size_t k = 0; k < change.size(); ++k) change[k] = (after[k] - before[k]) / step;
     if (keep_comparable(c, change)) column[c] = whiten(c, change);
   }
+  of_shifts_.apply(column);
   return column;
 }
 
@@ -289,6 +346,7 @@ Column Evidence::whiten(const SeriesOfChannels& change) const {
     std::vector<double> d = change[c];
     if (keep_comparable(c, d)) column[c] = whiten(c, d);
   }
+  of_shifts_.apply(column);
   return column;
 }
 
@@ -301,6 +359,10 @@ double Evidence::count(Role role) const {
   double n = 0;
   for (std::size_t c = 0; c < valid_.size(); ++c) n += count(c, role);
   return n;
+}
+
+double Evidence::scatter(std::size_t channel, Role role) const {
+  return noise_.from_repetitions ? count(channel, role) * noise_.channels[channel].of_laps : 0;
 }
 
 double Evidence::chi2(const Column& column, std::size_t channel, Role role) const {

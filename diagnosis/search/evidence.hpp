@@ -5,10 +5,13 @@
 // with W the whitening of every channel (noise_audit.hpp). All that fitting, choosing and judging
 // needs are products of such columns, kept per block of the partition: from them come chi-square on
 // fitted and held-out laps, normal equations, gains per condition and resampled laps.
+// Shifts of the piece from lap to lap are whitened in addition (lap_shifts.hpp): as large as the
+// rounding of encoders makes them, and as between laps of a healthy run.
 //
 // Masked are samples that are missing, those outside every stretch, force and twist of an axis that
-// stands (stuck friction and the loop's integral are not predictable there), and readings that are
-// rough while the ball slides slowly: the drag on it turns over, nobody can tell when.
+// stands (stuck friction and the loop's integral are not predictable there), readings about the
+// moment of touching, and such as are rough while the ball slides slowly: the drag on it turns
+// over, nobody can tell when.
 #pragma once
 
 #include <Eigen/Dense>
@@ -20,6 +23,7 @@
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
 #include "diagnosis/search/gathering.hpp"
+#include "diagnosis/search/lap_shifts.hpp"
 #include "diagnosis/search/noise_audit.hpp"
 #include "diagnosis/search/partition.hpp"
 #include "diagnosis/search/role_grams.hpp"
@@ -48,8 +52,12 @@ class Column {
 /// z less the sum of step_i columns_i.
 Column less(const Column& z, const std::vector<Column>& columns, const Eigen::VectorXd& step);
 
-/// One series per channel in SI.
-using SeriesOfChannels = std::vector<std::vector<double>>;
+/// What noise there is beyond what laps tell.
+struct MoreNoise {
+  double scale = 1;  ///< of the standard deviation of samples
+  /// By which the piece lies elsewhere from lap to lap, x y z [m].
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+};
 
 /// Products of columns, one matrix per block.
 using BlockGrams = std::vector<Eigen::MatrixXd>;
@@ -59,14 +67,16 @@ enum class Role { fitted, held_out, both };
 class Evidence {
  public:
   /// `declared` says which samples can be compared at all, and gives the residual whose repetitions
-  /// tell the noise; `noise_scale` is what its standard deviation grows by beyond what laps tell.
-  /// All arguments must outlive this.
-  Evidence(const Record& record, Replica& replica, const Machine& declared, double noise_scale = 1);
+  /// tell the noise. The references must outlive this.
+  Evidence(const Record& record, Replica& replica, const Machine& declared,
+           const MoreNoise& more = {});
 
   const Record& record() const { return record_; }
   const Replica& replica() const { return replica_; }
   const Partition& partition() const { return partition_; }
   const NoiseAudit& noise() const { return noise_; }
+  /// How far apart the piece lies in laps of one condition, x y z [m].
+  const Eigen::Vector3d& lap_scatter() const { return lap_scatter_; }
 
   Prediction predict(const Machine& hypothesis) const;
   /// As many at a time as are worth it.
@@ -91,6 +101,8 @@ class Evidence {
   /// Samples of a channel that count.
   double count(std::size_t channel, Role role) const;
   double count(Role role) const;
+  /// Chi-square of a channel that laps of one condition differ by; none where nothing is repeated.
+  double scatter(std::size_t channel, Role role) const;
   /// chi-square of one channel of a column.
   double chi2(const Column& column, std::size_t channel, Role role) const;
   double chi2(const Column& column, Role role) const;
@@ -114,10 +126,13 @@ class Evidence {
   std::vector<float> whiten(std::size_t channel, const std::vector<double>& series) const;
   bool keep_comparable(std::size_t channel, std::vector<double>& change) const;
   void mask_standing();
+  void mask_touching();
   void mask_turning_drag();
-  /// Takes out of every lap what a piece that shifts during the run would make of its readings:
-  /// that drifts from lap to lap and is no noise.
-  void take_out_shifts(const Machine& declared, SeriesOfChannels& difference) const;
+  /// What these machines make of the readings of the probe, of what each is shifted by [m]; empty
+  /// where there are none.
+  std::vector<SeriesOfChannels> readings_per_shift(const std::vector<Machine>& shifted) const;
+  /// Says nothing of samples that cannot be compared.
+  void mask(SeriesOfChannels& series) const;
   /// Adds the products in one block and channel.
   static void add_products(const std::vector<const Column*>& columns, std::size_t channel,
                            const Block& block, Eigen::MatrixXd& to);
@@ -131,6 +146,8 @@ class Evidence {
   std::vector<std::vector<char>> raw_valid_, valid_;
   std::vector<double> fitted_count_, held_out_count_;  ///< of valid_, per channel
   NoiseAudit noise_;
+  Eigen::Vector3d lap_scatter_;
+  ShiftWhitening of_shifts_;
 };
 
 }  // namespace vcnc

@@ -255,9 +255,9 @@ NoiseAudit audit_noise(const Record& record, const Partition& partition,
     noise.filter = fit_autoregression(covariance);
     const double expected = noise.filter.scale * noise.filter.scale;
     const double left = left_by(noise.filter, laps);
-    noise.whiteness = expected / covariance[0];
     // Where the laps are quieter than the channel can be, what it can be counts.
     noise.filter.scale = std::sqrt(quiet || covariance[0] > of_laps ? expected : left);
+    noise.of_laps = std::min(1.0, left / (noise.filter.scale * noise.filter.scale));
     if (audit.from_repetitions) {
       const std::vector<NoiseLine> lines =
           find_lines(channels[c], laps, record.period, 0.1 * std::sqrt(least));

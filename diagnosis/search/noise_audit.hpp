@@ -50,8 +50,9 @@ struct NoiseLine {
 struct ChannelNoise {
   WhiteningFilter filter;
   double rms = 0;  ///< of the noise [SI]
-  double whiteness =
-      1;  ///< variance of the held-out noise after the filter over that before: 1 is white
+  /// Variance after the filter of what laps really differ by: 1, or less where the channel counts
+  /// as noisier than that.
+  double of_laps = 1;
 };
 
 struct NoiseAudit {

@@ -273,12 +273,16 @@ class Search {
       for (const Contender& r : rivals)
         if (r.gain > std::max(lost - contest.band_of(lost), 0.5 * lost))
           m.added[i].class_with.push_back(r.candidate);
+      const double worth = lost - 4 * static_cast<double>(m.added[i].numbers.size()),
+                   counts =
+                       contest.counts(lost, Ground(evidence_, m.residual, m.linear()).held_out_of);
       ++i;
-      if (rivals.empty() ||
-          rivals.front().worth() < lost - 4 * static_cast<double>(m.added[i - 1].numbers.size()))
-        continue;
+      const auto better = std::find_if(rivals.begin(), rivals.end(), [&](const Contender& r) {
+        return r.worth() >= worth && contest.counts(r.gain, r.fit.held_out_of) >= counts;
+      });
+      if (better == rivals.end()) continue;
       FittedMachine other = less;
-      add(other, rivals.front(), {});
+      add(other, *better, {});
       if (other.held_out > m.held_out - options_.least_gain) {
         evidence_.anchor(m.machine);
         continue;

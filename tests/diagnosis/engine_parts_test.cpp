@@ -162,15 +162,16 @@ TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {
   DiagnosisOptions options;
   options.share_of_found = 0.01;
   EXPECT_TRUE(doubt_of(options, {}, {500, 600}).empty());
-  EXPECT_EQ(doubt_of(options, {2500, 500}, {500, 600}), (Doubt{20, 0}));
+  // What was brought into the second channel counts for nobody who takes it out.
+  EXPECT_EQ(doubt_of(options, {2500, 500}, {500, 600}), (Doubt{20, 100}));
   options.form_of_channel = {100, 0};
   options.taken_of_form = 0.5;
   const Doubt doubt = doubt_of(options, {2500, 500}, {500, 600});
-  EXPECT_EQ(doubt, (Doubt{70, 0}));
-  // 300 of 400 come from the first channel; a loss takes nothing away, a small gain all of itself.
-  EXPECT_DOUBLE_EQ(counted(400, {500, 600}, {200, 500}, doubt), 330);
-  EXPECT_DOUBLE_EQ(counted(60, {500, 600}, {540, 500}, doubt), 60);
-  EXPECT_DOUBLE_EQ(counted(110, {500, 600}, {490, 500}, doubt), 100);
+  EXPECT_EQ(doubt, (Doubt{70, 100}));
+  // 300 of 500 come from the first channel; a loss takes nothing away, a small gain all of itself.
+  EXPECT_DOUBLE_EQ(counted(500, {500, 600}, {200, 400}, doubt), 330);
+  EXPECT_DOUBLE_EQ(counted(160, {500, 600}, {540, 400}, doubt), 60);
+  EXPECT_DOUBLE_EQ(counted(110, {500, 600}, {490, 500}, doubt), 0);
 }
 
 TEST(CountedGain, DoubtsALawLessThatWasSeenToBeRight) {

@@ -1,0 +1,138 @@
+#include "diagnosis/search/lap_shifts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+
+namespace vcnc {
+namespace {
+
+/// What each shift makes of one sample: constant ones, then growing ones.
+void fill_row(const std::vector<SeriesOfChannels>& per_shift, const Stretch& lap, std::size_t c,
+              std::size_t k, Eigen::VectorXd& x) {
+  const double t = static_cast<double>(k - lap.begin) / static_cast<double>(lap.end - lap.begin);
+  const std::size_t n = per_shift.size();
+  for (std::size_t j = 0; j < n; ++j) {
+    const double d = std::isfinite(per_shift[j][c][k]) ? per_shift[j][c][k] : 0;
+    x[static_cast<Eigen::Index>(j)] = d;
+    x[static_cast<Eigen::Index>(n + j)] = d * (t - 0.5);
+  }
+}
+
+Eigen::VectorXd shift_of(const Stretch& lap, const std::vector<SeriesOfChannels>& per_shift,
+                         const SeriesOfChannels& series) {
+  const auto columns = static_cast<Eigen::Index>(2 * per_shift.size());
+  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(columns, columns);
+  Eigen::VectorXd with_series = Eigen::VectorXd::Zero(columns), x(columns);
+  for (std::size_t c = 0; c < series.size(); ++c) {
+    if (per_shift[0][c].empty()) continue;
+    for (std::size_t k = lap.begin; k < lap.end; ++k) {
+      if (!std::isfinite(series[c][k])) continue;
+      fill_row(per_shift, lap, c, k, x);
+      products.noalias() += x * x.transpose();
+      with_series += x * series[c][k];
+    }
+  }
+  products.diagonal().array() += 1e-9 * products.diagonal().maxCoeff() + 1e-300;
+  return products.ldlt().solve(with_series);
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector3d> lap_shifts(const std::vector<Stretch>& laps,
+                                        const std::vector<SeriesOfChannels>& per_shift,
+                                        const SeriesOfChannels& series) {
+  std::vector<Eigen::Vector3d> shifts;
+  for (const Stretch& lap : laps) shifts.push_back(shift_of(lap, per_shift, series).head<3>());
+  return shifts;
+}
+
+void take_out_shifts(const std::vector<Stretch>& laps,
+                     const std::vector<SeriesOfChannels>& per_shift, SeriesOfChannels& series) {
+  for (const Stretch& lap : laps) {
+    const Eigen::VectorXd shift = shift_of(lap, per_shift, series);
+    Eigen::VectorXd x(shift.size());
+    for (std::size_t c = 0; c < series.size(); ++c) {
+      if (per_shift[0][c].empty()) continue;
+      for (std::size_t k = lap.begin; k < lap.end; ++k) {
+        fill_row(per_shift, lap, c, k, x);
+        series[c][k] -= shift.dot(x);
+      }
+    }
+  }
+}
+
+Eigen::Vector3d rms_of(const std::vector<Eigen::Vector3d>& shifts) {
+  Eigen::Array3d sum = Eigen::Array3d::Zero();
+  for (const Eigen::Vector3d& s : shifts) sum += s.array().square();
+  return (sum / std::max<double>(1, static_cast<double>(shifts.size()))).sqrt();
+}
+
+Eigen::Vector3d scatter_of(const std::vector<Stretch>& laps,
+                           const std::vector<Eigen::Vector3d>& shifts) {
+  std::map<int, std::vector<Eigen::Vector3d>> of_condition;
+  for (std::size_t i = 0; i < laps.size(); ++i)
+    of_condition[laps[i].condition].push_back(shifts[i]);
+  Eigen::Array3d sum = Eigen::Array3d::Zero();
+  double freedom = 0;
+  for (const auto& [condition, of] : of_condition) {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& s : of) mean += s / static_cast<double>(of.size());
+    for (const Eigen::Vector3d& s : of) sum += (s - mean).array().square();
+    freedom += static_cast<double>(of.size()) - 1;
+  }
+  return freedom > 0 ? Eigen::Vector3d((sum / freedom).sqrt()) : Eigen::Vector3d::Zero();
+}
+
+ShiftWhitening::ShiftWhitening(std::vector<Stretch> laps, const std::vector<Channels>& per_shift)
+    : laps_(std::move(laps)) {
+  std::set<std::size_t> changed;
+  for (const Channels& column : per_shift)
+    for (std::size_t c = 0; c < column.size(); ++c)
+      if (!column[c].empty()) changed.insert(c);
+  channels_.assign(changed.begin(), changed.end());
+  for (const Stretch& lap : laps_) {
+    const std::size_t length = lap.end - lap.begin;
+    Eigen::MatrixXf u = Eigen::MatrixXf::Zero(static_cast<Eigen::Index>(length * channels_.size()),
+                                              static_cast<Eigen::Index>(per_shift.size()));
+    for (std::size_t j = 0; j < per_shift.size(); ++j)
+      for (std::size_t i = 0; i < channels_.size(); ++i) {
+        const std::vector<float>& from = per_shift[j][channels_[i]];
+        if (from.empty()) continue;
+        for (std::size_t k = 0; k < length; ++k)
+          u(static_cast<Eigen::Index>(i * length + k), static_cast<Eigen::Index>(j)) =
+              from[lap.begin + k];
+      }
+    const Eigen::MatrixXd products = (u.transpose() * u).cast<double>();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(products);
+    Eigen::VectorXd scale = Eigen::VectorXd::Zero(products.rows());
+    for (Eigen::Index i = 0; i < scale.size(); ++i)
+      if (const double l = axes.eigenvalues()[i]; l > 1e-9)
+        scale[i] = std::sqrt((1 - 1 / std::sqrt(1 + l)) / l);
+    vectors_.push_back(u * (axes.eigenvectors() * scale.asDiagonal()).cast<float>());
+  }
+}
+
+void ShiftWhitening::apply(Channels& z) const {
+  const auto is_empty = [&](std::size_t c) { return z[c].empty(); };
+  if (std::all_of(channels_.begin(), channels_.end(), is_empty)) return;
+  const auto some =
+      std::find_if(z.begin(), z.end(), [](const std::vector<float>& c) { return !c.empty(); });
+  for (const std::size_t c : channels_) z[c].resize(some->size(), 0.0F);
+  for (std::size_t n = 0; n < laps_.size(); ++n) {
+    const auto length = static_cast<Eigen::Index>(laps_[n].end - laps_[n].begin);
+    const auto part = [&](std::size_t i) {
+      return Eigen::Map<Eigen::VectorXf>(&z[channels_[i]][laps_[n].begin], length);
+    };
+    Eigen::VectorXf along = Eigen::VectorXf::Zero(vectors_[n].cols());
+    for (std::size_t i = 0; i < channels_.size(); ++i)
+      along += vectors_[n].middleRows(static_cast<Eigen::Index>(i) * length, length).transpose() *
+               part(i);
+    for (std::size_t i = 0; i < channels_.size(); ++i)
+      part(i) -= vectors_[n].middleRows(static_cast<Eigen::Index>(i) * length, length) * along;
+  }
+}
+
+}  // namespace vcnc

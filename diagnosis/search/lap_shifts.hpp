@@ -1,0 +1,61 @@
+// A piece that does not lie where it lay a lap before.
+//
+// What shifts a piece by s = (x, y, z) during a lap changes its readings by J s, with J the change
+// of the readings per shift at that moment. Temperatures drift, and an axis that stands rests
+// anywhere within the step of its encoder, so every lap has a shift of its own; the whitening of
+// samples (noise_audit.hpp) knows nothing of what stays for a lap. With shifts of the standard
+// deviation tau, U = W J tau and W that whitening, the noise of a lap has the covariance 1 + U U^T.
+// It is whitened by
+//
+//   (1 + U U^T)^(-1/2) = 1 - sum_i v_i v_i^T (1 - 1/sqrt(1 + l_i)) / l_i
+//
+// with v_i the columns of U turned to the axes of U^T U and l_i = v_i^T v_i (random effects: Laird,
+// Ware, Biometrics 38 (1982) 963).
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "diagnosis/records/record.hpp"
+#include "model/axes.hpp"
+
+namespace vcnc {
+
+/// One series per channel in SI, NaN where there is nothing to compare.
+using SeriesOfChannels = std::vector<std::vector<double>>;
+
+/// Least-squares shifts of the laps, in the unit that `per_shift` is per: one element for x, y, z
+/// each. Shifts that grow during the lap are fitted along.
+std::vector<Eigen::Vector3d> lap_shifts(const std::vector<Stretch>& laps,
+                                        const std::vector<SeriesOfChannels>& per_shift,
+                                        const SeriesOfChannels& series);
+
+/// Takes out of every lap what shifts, constant or growing, make of it; any number of them.
+void take_out_shifts(const std::vector<Stretch>& laps,
+                     const std::vector<SeriesOfChannels>& per_shift, SeriesOfChannels& series);
+
+/// RMS of shifts per direction: about zero, or of laps of one condition about their mean (0 where
+/// none is repeated).
+Eigen::Vector3d rms_of(const std::vector<Eigen::Vector3d>& shifts);
+Eigen::Vector3d scatter_of(const std::vector<Stretch>& laps,
+                           const std::vector<Eigen::Vector3d>& shifts);
+
+/// Whitens what a shift makes of a lap.
+class ShiftWhitening {
+ public:
+  using Channels = std::vector<std::vector<float>>;
+
+  ShiftWhitening() = default;
+  /// `per_shift`: what standard deviations of the shifts in x, y, z make of whitened channels; a
+  /// channel may be empty.
+  ShiftWhitening(std::vector<Stretch> laps, const std::vector<Channels>& per_shift);
+  /// Of whitened channels, where an empty one is zero.
+  void apply(Channels& z) const;
+
+ private:
+  std::vector<Stretch> laps_;
+  std::vector<std::size_t> channels_;     ///< that a shift changes
+  std::vector<Eigen::MatrixXf> vectors_;  ///< per lap: samples of these channels in rows
+};
+
+}  // namespace vcnc
