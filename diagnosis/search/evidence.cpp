@@ -4,22 +4,14 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "diagnosis/search/freed_number.hpp"
+#include "diagnosis/search/comparable.hpp"
 #include "diagnosis/search/parallel.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {
 namespace {
 
-/// An axis stands when its command moved less than this in each of the last and next 25 ms.
-constexpr double kStandingLinear = 0.2e-3, kStandingRotary = 0.2e-3;  // [m/s], [rad/s]
-constexpr double kReach = 0.025;                                      // [s]
-/// Readings are rough where their second differences in that reach are as large, of the usual.
-constexpr double kRough = 8;
-constexpr double kSlowSliding = 20e-3;  // [m/s]
-/// A ball that is deflected by less is free; readings so soon before and after it touches depend
-/// on where exactly the piece lies.
-constexpr double kFree = 1e-6, kTouching = 0.05;  // [m], [s]
+constexpr double kShift = 10e-6;  // of a piece, to see what one does [m]
 
 /// sum of a b, in doubles and several at a time.
 double dot(const float* a, const float* b, std::size_t n) {
@@ -31,35 +23,6 @@ double dot(const float* a, const float* b, std::size_t n) {
       sum[j] += static_cast<double>(a[k + j]) * static_cast<double>(b[k + j]);
   for (; k < n; ++k) sum[0] += static_cast<double>(a[k]) * static_cast<double>(b[k]);
   return ((sum[0] + sum[4]) + (sum[1] + sum[5])) + ((sum[2] + sum[6]) + (sum[3] + sum[7]));
-}
-
-constexpr double kShift = 10e-6;  // to see what one does [m]
-
-/// The piece shifted in x, y, z.
-std::vector<Machine> with_piece_shifted(const Machine& machine) {
-  std::vector<Machine> all;
-  for (const char* key :
-       {"effects.setup.piece_offset.shift_um.x", "effects.setup.piece_offset.shift_um.y",
-        "effects.setup.piece_offset.shift_um.z"}) {
-    all.push_back(machine);
-    move_number(all.back(), key, number_of(machine, key) + kShift * 1e6);
-  }
-  return all;
-}
-
-/// The tool centre shifted along X, Y, Z.
-std::vector<Machine> with_axes_shifted(const Machine& machine) {
-  std::vector<Machine> all;
-  for (const Law::OfAxis axis : {Law::OfAxis::X, Law::OfAxis::Y, Law::OfAxis::Z}) {
-    Law shift;
-    shift.axis = axis;
-    shift.point = Law::Point::displacement;
-    shift.at = {0, 1};
-    shift.value = {kShift, kShift};
-    all.push_back(machine);
-    all.back().effects.laws.push_back(std::move(shift));
-  }
-  return all;
 }
 
 }  // namespace
@@ -91,29 +54,22 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
       replica_(replica),
       gathering_(replica),
       partition_(vcnc::partition(record)),
+      declared_(replica.predict(declared)),
       lap_scatter_(Eigen::Vector3d::Zero()) {
-  const std::vector<ComparedChannel>& channels = replica.channels();
-  declared_ = replica.predict(declared);
-  for (std::size_t c = 0; c < channels.size(); ++c) {
-    const MeasuredSignal* signal = record.find(channels[c].kind, channels[c].axis);
+  for (const ComparedChannel& channel : replica.channels()) {
+    const MeasuredSignal* signal = record.find(channel.kind, channel.axis);
     if (!signal) throw std::logic_error("a replica predicts a channel that the record has not");
     measured_.push_back(signal->value);
-    raw_valid_.emplace_back(record.samples());
-    for (std::size_t k = 0; k < record.samples(); ++k)
-      raw_valid_[c][k] = std::isfinite(measured_[c][k]) && std::isfinite(declared_[c][k]);
   }
-  mask_standing();
-  mask_touching();
-  mask_turning_drag();
-
-  SeriesOfChannels difference = measured_;
-  for (std::size_t c = 0; c < channels.size(); ++c)
+  raw_valid_ = comparable_samples(record, replica.channels(), measured_, declared_);
+  SeriesOfChannels difference = measured_, rounding = replica.rounding(declared);
+  for (std::size_t c = 0; c < difference.size(); ++c)
     for (std::size_t k = 0; k < difference[c].size(); ++k) difference[c][k] -= declared_[c][k];
   mask(difference);
-  SeriesOfChannels rounding = replica.rounding(declared);
   mask(rounding);
   const std::vector<Stretch>& laps = partition_.stretches;
-  const std::vector<SeriesOfChannels> per_shift = readings_per_shift(with_piece_shifted(declared));
+  const std::vector<SeriesOfChannels> per_shift =
+      readings_per_shift(with_piece_shifted(declared, kShift));
   Eigen::Vector3d shift = more.shift;
   if (!per_shift.empty()) {
     lap_scatter_ = scatter_of(laps, lap_shifts(laps, per_shift, difference));
@@ -123,16 +79,21 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
               .sqrt();
     // A piece or an axis that drifts from lap to lap is no noise of the samples.
     if (partition_.repeated) {
-      std::vector<SeriesOfChannels> either = readings_per_shift(with_axes_shifted(declared));
+      std::vector<SeriesOfChannels> either =
+          readings_per_shift(with_axes_shifted(declared, kShift));
       either.insert(either.end(), per_shift.begin(), per_shift.end());
       take_out_shifts(laps, either, difference);
     }
   }
-  noise_ = audit_noise(record, partition_, channels, difference, rounding);
+  noise_ = audit_noise(record, partition_, replica.channels(), difference, rounding);
   for (ChannelNoise& channel : noise_.channels) channel.filter.scale *= more.scale;
+  count_valid();
+  if (!shift.isZero()) whiten_shifts(per_shift, shift);
+}
 
-  for (std::size_t c = 0; c < channels.size(); ++c) {
-    valid_.emplace_back(record.samples(), 0);
+void Evidence::count_valid() {
+  for (std::size_t c = 0; c < raw_valid_.size(); ++c) {
+    valid_.emplace_back(record_.samples(), 0);
     const std::size_t order = noise_.channels[c].filter.a.size();
     fitted_count_.push_back(0);
     held_out_count_.push_back(0);
@@ -147,17 +108,20 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
       }
     }
   }
-  if (per_shift.empty() || shift.isZero()) return;
+}
+
+void Evidence::whiten_shifts(const std::vector<SeriesOfChannels>& per_shift,
+                             const Eigen::Vector3d& shift) {
   std::vector<Column::Channels> of_shifts;
   for (std::size_t j = 0; j < per_shift.size(); ++j) {
-    Column::Channels& column = of_shifts.emplace_back(channels.size());
-    for (std::size_t c = 0; c < channels.size(); ++c) {
+    Column::Channels& column = of_shifts.emplace_back(per_shift[j].size());
+    for (std::size_t c = 0; c < column.size(); ++c) {
       std::vector<double> change = per_shift[j][c];
       for (double& d : change) d *= shift[static_cast<Eigen::Index>(j)];
       if (!change.empty() && keep_comparable(c, change)) column[c] = whiten(c, change);
     }
   }
-  of_shifts_ = ShiftWhitening(laps, of_shifts);
+  of_shifts_ = ShiftWhitening(partition_.stretches, of_shifts);
 }
 
 void Evidence::leave_out_drive(std::size_t axis) {
@@ -166,80 +130,6 @@ void Evidence::leave_out_drive(std::size_t axis) {
     if (channel.axis != axis || channel.kind == SignalKind::deflection) continue;
     std::fill(valid_[c].begin(), valid_[c].end(), 0);
     fitted_count_[c] = held_out_count_[c] = 0;
-  }
-}
-
-void Evidence::mask_standing() {
-  const auto reach = static_cast<std::size_t>(std::round(kReach / record_.period));
-  for (std::size_t c = 0; c < raw_valid_.size(); ++c) {
-    const ComparedChannel& channel = replica_.channels()[c];
-    if (channel.kind != SignalKind::force && channel.kind != SignalKind::twist) continue;
-    const MeasuredSignal* command = record_.find(SignalKind::command, channel.axis);
-    if (!command) continue;
-    const double slow = (is_rotary(channel.axis) ? kStandingRotary : kStandingLinear) *
-                        static_cast<double>(reach) * record_.period;
-    const std::vector<double>& q = command->value;
-    for (std::size_t k = 0; k < q.size(); ++k) {
-      const std::size_t before = k > reach ? k - reach : 0;
-      const std::size_t after = std::min(q.size() - 1, k + reach);
-      if (std::abs(q[k] - q[before]) < slow || std::abs(q[after] - q[k]) < slow)
-        raw_valid_[c][k] = 0;
-    }
-  }
-}
-
-void Evidence::mask_touching() {
-  const auto reach = static_cast<std::size_t>(std::round(kTouching / record_.period));
-  const std::size_t n = record_.samples();
-  std::vector<std::size_t> readings;
-  for (std::size_t c = 0; c < raw_valid_.size(); ++c)
-    if (replica_.channels()[c].kind == SignalKind::deflection) readings.push_back(c);
-  const auto free = [&](std::size_t k) {
-    return std::all_of(readings.begin(), readings.end(),
-                       [&](std::size_t c) { return !(std::abs(declared_[c][k]) > kFree); });
-  };
-  for (std::size_t k = 1; k < n && !readings.empty(); ++k) {
-    if (free(k) == free(k - 1)) continue;
-    for (const std::size_t c : readings)
-      std::fill(raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(k > reach ? k - reach : 0),
-                raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(std::min(n, k + reach)), 0);
-  }
-}
-
-void Evidence::mask_turning_drag() {
-  const auto reach = static_cast<std::size_t>(std::round(kReach / record_.period));
-  const std::size_t n = record_.samples();
-  std::vector<double> squared_speed(n, 0.0);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const MeasuredSignal* command = record_.find(SignalKind::command, axis);
-    if (!command) return;
-    for (std::size_t k = 1; k < n; ++k) {
-      const double v = (command->value[k] - command->value[k - 1]) / record_.period;
-      squared_speed[k] += v * v;
-    }
-  }
-  for (std::size_t c = 0; c < raw_valid_.size(); ++c) {
-    if (replica_.channels()[c].kind != SignalKind::deflection) continue;
-    std::vector<double> second(n, 0.0), present;  // squares of second differences of the residual
-    for (std::size_t k = 2; k < n; ++k) {
-      if (!raw_valid_[c][k] || !raw_valid_[c][k - 1] || !raw_valid_[c][k - 2]) continue;
-      const auto r = [&](std::size_t i) { return measured_[c][i] - declared_[c][i]; };
-      const double d = r(k) - 2 * r(k - 1) + r(k - 2);
-      second[k] = d * d;
-      present.push_back(second[k]);
-    }
-    if (present.empty()) continue;
-    const auto middle = present.begin() + static_cast<std::ptrdiff_t>(present.size() / 2);
-    std::nth_element(present.begin(), middle, present.end());
-    constexpr double kMedianOfSquare = 0.455;  // of a normal deviate
-    const double most = kRough * kRough * *middle / kMedianOfSquare;
-    std::vector<double> sum(n + 1, 0.0);
-    for (std::size_t k = 0; k < n; ++k) sum[k + 1] = sum[k] + second[k];
-    for (std::size_t k = 0; k < n; ++k) {
-      const std::size_t first = k > reach ? k - reach : 0, last = std::min(n, k + reach + 1);
-      const double mean = (sum[last] - sum[first]) / static_cast<double>(last - first);
-      if (mean > most && squared_speed[k] < kSlowSliding * kSlowSliding) raw_valid_[c][k] = 0;
-    }
   }
 }
 

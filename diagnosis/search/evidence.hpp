@@ -8,10 +8,7 @@
 // Shifts of the piece from lap to lap are whitened in addition (lap_shifts.hpp): as large as the
 // rounding of encoders makes them, and as between laps of a healthy run.
 //
-// Masked are samples that are missing, those outside every stretch, force and twist of an axis that
-// stands (stuck friction and the loop's integral are not predictable there), readings about the
-// moment of touching, and such as are rough while the ball slides slowly: the drag on it turns
-// over, nobody can tell when.
+// Only samples that can be compared count (comparable.hpp), and none outside every stretch.
 #pragma once
 
 #include <Eigen/Dense>
@@ -125,12 +122,11 @@ class Evidence {
   }
   std::vector<float> whiten(std::size_t channel, const std::vector<double>& series) const;
   bool keep_comparable(std::size_t channel, std::vector<double>& change) const;
-  void mask_standing();
-  void mask_touching();
-  void mask_turning_drag();
   /// What these machines make of the readings of the probe, of what each is shifted by [m]; empty
   /// where there are none.
   std::vector<SeriesOfChannels> readings_per_shift(const std::vector<Machine>& shifted) const;
+  void count_valid();
+  void whiten_shifts(const std::vector<SeriesOfChannels>& per_shift, const Eigen::Vector3d& shift);
   /// Says nothing of samples that cannot be compared.
   void mask(SeriesOfChannels& series) const;
   /// Adds the products in one block and channel.

@@ -6,6 +6,8 @@
 #include <set>
 #include <utility>
 
+#include "diagnosis/search/freed_number.hpp"
+
 namespace vcnc {
 namespace {
 
@@ -40,6 +42,31 @@ Eigen::VectorXd shift_of(const Stretch& lap, const std::vector<SeriesOfChannels>
 }
 
 }  // namespace
+
+std::vector<Machine> with_piece_shifted(const Machine& machine, double by) {
+  std::vector<Machine> all;
+  for (const char* key :
+       {"effects.setup.piece_offset.shift_um.x", "effects.setup.piece_offset.shift_um.y",
+        "effects.setup.piece_offset.shift_um.z"}) {
+    all.push_back(machine);
+    move_number(all.back(), key, number_of(machine, key) + by * 1e6);
+  }
+  return all;
+}
+
+std::vector<Machine> with_axes_shifted(const Machine& machine, double by) {
+  std::vector<Machine> all;
+  for (const Law::OfAxis axis : {Law::OfAxis::X, Law::OfAxis::Y, Law::OfAxis::Z}) {
+    Law shift;
+    shift.axis = axis;
+    shift.point = Law::Point::displacement;
+    shift.at = {0, 1};
+    shift.value = {by, by};
+    all.push_back(machine);
+    all.back().effects.laws.push_back(std::move(shift));
+  }
+  return all;
+}
 
 std::vector<Eigen::Vector3d> lap_shifts(const std::vector<Stretch>& laps,
                                         const std::vector<SeriesOfChannels>& per_shift,

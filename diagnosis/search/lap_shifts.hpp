@@ -17,12 +17,16 @@
 #include <vector>
 
 #include "diagnosis/records/record.hpp"
-#include "model/axes.hpp"
+#include "model/machine.hpp"
 
 namespace vcnc {
 
 /// One series per channel in SI, NaN where there is nothing to compare.
 using SeriesOfChannels = std::vector<std::vector<double>>;
+
+/// The piece shifted in x, y, z; the tool centre shifted along X, Y, Z, each [m].
+std::vector<Machine> with_piece_shifted(const Machine& machine, double by);
+std::vector<Machine> with_axes_shifted(const Machine& machine, double by);
 
 /// Least-squares shifts of the laps, in the unit that `per_shift` is per: one element for x, y, z
 /// each. Shifts that grow during the lap are fitted along.

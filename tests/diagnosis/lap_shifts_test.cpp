@@ -105,26 +105,6 @@ TEST(Evidence, ShiftsAsBetweenLapsOfTheHealthyRunAreNoise) {
   EXPECT_LT(std::abs(above(knowing)), 5 * std::sqrt(4 * knowing.count(Role::both)));
 }
 
-TEST(Evidence, MomentsOfTouchingAreMasked) {
-  Machine declared;
-  declared.effects.get<Squareness>().xy = 1e-3;  // 30 um to either side: free below 1 um
-  Record record = toy::commands(2000, 4);
-  toy::measure(record, declared, 14);
-  toy::ToyReplica replica(record);
-  const Evidence evidence(record, replica, declared);
-  const Prediction reading = replica.predict(declared);
-  std::size_t near = 0;
-  const Column z = evidence.residual(evidence.predict(declared));
-  for (std::size_t k = 1; k + 50 < 2000; ++k) {
-    const auto free = [&](std::size_t i) { return std::abs(reading[2][i]) <= 1e-6; };
-    if (free(k) == free(k - 1)) continue;
-    ++near;
-    for (std::size_t i = k > 50 ? k - 50 : 0; i < k + 50; ++i) EXPECT_EQ(z[2][i], 0);
-  }
-  EXPECT_GT(near, 1U);
-  EXPECT_NE(z[2][500], 0);
-}
-
 TEST(Contest, WhatDoesNotStandOutIsNotTold) {
   Record record = toy::commands(400, 4);
   toy::measure(record, Machine(), 1);

@@ -1,0 +1,129 @@
+#include "diagnosis/search/comparable.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "model/axes.hpp"
+
+namespace vcnc {
+namespace {
+
+using Flags = std::vector<std::vector<char>>;
+
+/// An axis stands when its command moved less than this in each of the last and next 25 ms.
+constexpr double kStandingLinear = 0.2e-3, kStandingRotary = 0.2e-3;  // [m/s], [rad/s]
+constexpr double kReach = 0.025;                                      // [s]
+/// Readings are rough where their second differences in that reach are as large, of the usual.
+constexpr double kRough = 8;
+constexpr double kSlowSliding = 20e-3;  // [m/s]
+/// A ball that is deflected by less is free; readings so soon before and after it touches depend
+/// on where exactly the piece lies.
+constexpr double kFree = 1e-6, kTouching = 0.05;  // [m], [s]
+
+void mask_standing(const Record& record, const std::vector<ComparedChannel>& channels,
+                   Flags& valid) {
+  const auto reach = static_cast<std::size_t>(std::round(kReach / record.period));
+  for (std::size_t c = 0; c < valid.size(); ++c) {
+    const ComparedChannel& channel = channels[c];
+    if (channel.kind != SignalKind::force && channel.kind != SignalKind::twist) continue;
+    const MeasuredSignal* command = record.find(SignalKind::command, channel.axis);
+    if (!command) continue;
+    const double slow = (is_rotary(channel.axis) ? kStandingRotary : kStandingLinear) *
+                        static_cast<double>(reach) * record.period;
+    const std::vector<double>& q = command->value;
+    for (std::size_t k = 0; k < q.size(); ++k) {
+      const std::size_t before = k > reach ? k - reach : 0;
+      const std::size_t after = std::min(q.size() - 1, k + reach);
+      if (std::abs(q[k] - q[before]) < slow || std::abs(q[after] - q[k]) < slow) valid[c][k] = 0;
+    }
+  }
+}
+
+void mask_touching(const Record& record, const std::vector<ComparedChannel>& channels,
+                   const Prediction& declared, Flags& valid) {
+  const auto samples = [&](double time) {
+    return static_cast<std::size_t>(std::round(time / record.period));
+  };
+  const std::size_t n = record.samples();
+  std::vector<std::size_t> readings;
+  for (std::size_t c = 0; c < valid.size(); ++c)
+    if (channels[c].kind == SignalKind::deflection) readings.push_back(c);
+  const auto free = [&](std::size_t k) {
+    return std::all_of(readings.begin(), readings.end(),
+                       [&](std::size_t c) { return !(std::abs(declared[c][k]) > kFree); });
+  };
+  const auto leave_out_about = [&](std::size_t k) {
+    const std::size_t begin = k > samples(kTouching) ? k - samples(kTouching) : 0;
+    for (const std::size_t c : readings)
+      std::fill(valid[c].begin() + static_cast<std::ptrdiff_t>(begin),
+                valid[c].begin() + static_cast<std::ptrdiff_t>(std::min(n, k + samples(kTouching))),
+                0);
+  };
+  for (std::size_t begin = 0; begin < n && !readings.empty();) {
+    std::size_t end = begin;
+    while (end < n && free(end)) ++end;
+    if (end - begin > samples(kReach)) {  // shorter: a reading goes through zero
+      if (begin > 0) leave_out_about(begin);
+      if (end < n) leave_out_about(end);
+    }
+    begin = end + 1;
+  }
+}
+
+void mask_turning_drag(const Record& record, const std::vector<ComparedChannel>& channels,
+                       const SeriesOfChannels& measured, const Prediction& declared, Flags& valid) {
+  const auto reach = static_cast<std::size_t>(std::round(kReach / record.period));
+  const std::size_t n = record.samples();
+  std::vector<double> squared_speed(n, 0.0);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const MeasuredSignal* command = record.find(SignalKind::command, axis);
+    if (!command) return;
+    for (std::size_t k = 1; k < n; ++k) {
+      const double v = (command->value[k] - command->value[k - 1]) / record.period;
+      squared_speed[k] += v * v;
+    }
+  }
+  for (std::size_t c = 0; c < valid.size(); ++c) {
+    if (channels[c].kind != SignalKind::deflection) continue;
+    std::vector<double> second(n, 0.0), present;  // squares of second differences of the residual
+    for (std::size_t k = 2; k < n; ++k) {
+      if (!valid[c][k] || !valid[c][k - 1] || !valid[c][k - 2]) continue;
+      const auto r = [&](std::size_t i) { return measured[c][i] - declared[c][i]; };
+      const double d = r(k) - 2 * r(k - 1) + r(k - 2);
+      second[k] = d * d;
+      present.push_back(second[k]);
+    }
+    if (present.empty()) continue;
+    const auto middle = present.begin() + static_cast<std::ptrdiff_t>(present.size() / 2);
+    std::nth_element(present.begin(), middle, present.end());
+    constexpr double kMedianOfSquare = 0.455;  // of a normal deviate
+    const double most = kRough * kRough * *middle / kMedianOfSquare;
+    std::vector<double> sum(n + 1, 0.0);
+    for (std::size_t k = 0; k < n; ++k) sum[k + 1] = sum[k] + second[k];
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::size_t first = k > reach ? k - reach : 0, last = std::min(n, k + reach + 1);
+      const double mean = (sum[last] - sum[first]) / static_cast<double>(last - first);
+      if (mean > most && squared_speed[k] < kSlowSliding * kSlowSliding) valid[c][k] = 0;
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<std::vector<char>> comparable_samples(const Record& record,
+                                                  const std::vector<ComparedChannel>& channels,
+                                                  const SeriesOfChannels& measured,
+                                                  const Prediction& declared) {
+  Flags valid;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    std::vector<char>& flags = valid.emplace_back(record.samples());
+    for (std::size_t k = 0; k < flags.size(); ++k)
+      flags[k] = std::isfinite(measured[c][k]) && std::isfinite(declared[c][k]);
+  }
+  mask_standing(record, channels, valid);
+  mask_touching(record, channels, declared, valid);
+  mask_turning_drag(record, channels, measured, declared, valid);
+  return valid;
+}
+
+}  // namespace vcnc

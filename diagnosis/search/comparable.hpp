@@ -1,0 +1,23 @@
+// Which samples of a record can be compared with a prediction at all.
+//
+// Not those that are missing in either, not force and twist of an axis that stands (stuck friction
+// and the loop's integral are not predictable there), not readings of the probe about the moment of
+// touching, which depends on where exactly the piece lies, and not such as are rough while the ball
+// slides slowly: the drag on it turns over, nobody can tell when.
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/records/record.hpp"
+#include "diagnosis/replica/replica.hpp"
+#include "diagnosis/search/lap_shifts.hpp"
+
+namespace vcnc {
+
+/// One flag per channel and sample; `declared` is what the declared machine would have measured.
+std::vector<std::vector<char>> comparable_samples(const Record& record,
+                                                  const std::vector<ComparedChannel>& channels,
+                                                  const SeriesOfChannels& measured,
+                                                  const Prediction& declared);
+
+}  // namespace vcnc

@@ -1,0 +1,101 @@
+#include "diagnosis/search/comparable.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "model/probe/noise.hpp"
+
+namespace vcnc {
+namespace {
+
+constexpr std::size_t kSamples = 2000;
+const std::vector<ComparedChannel> kChannels{
+    {SignalKind::position, 0}, {SignalKind::force, 0}, {SignalKind::deflection, 0}};
+
+/// X commanded so, Y and Z at rest; measured as predicted with noise of 100 nm in the reading.
+struct RecordedRamp {
+  Record record;
+  SeriesOfChannels measured, predicted;
+
+  explicit RecordedRamp(const std::vector<double>& x) {
+    const std::vector<double> rest(x.size(), 0.0);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      record.signals.push_back({SignalKind::command, axis, "", axis == 0 ? x : rest, 0});
+    predicted = measured = SeriesOfChannels(3, rest);
+    predicted[2].assign(x.size(), 100e-6);
+    for (std::size_t k = 0; k < x.size(); ++k)
+      measured[2][k] = 100e-6 + 100e-9 * gaussian_noise(3, 0, k)[0];
+  }
+  std::vector<std::vector<char>> comparable() const {
+    return comparable_samples(record, kChannels, measured,
+                              Prediction(predicted.begin(), predicted.end()));
+  }
+};
+
+std::vector<double> ramp(double speed) {
+  std::vector<double> x;
+  for (std::size_t k = 0; k < kSamples; ++k) x.push_back(speed * 1e-3 * static_cast<double>(k));
+  return x;
+}
+
+std::size_t left_out(const std::vector<char>& flags) {
+  return static_cast<std::size_t>(std::count(flags.begin(), flags.end(), 0));
+}
+
+TEST(Comparable, AllOfASmoothMotion) {
+  const auto flags = RecordedRamp(ramp(0.05)).comparable();
+  EXPECT_EQ(left_out(flags[0]), 0U);
+  EXPECT_EQ(left_out(flags[1]), 2U);  // before the first and after the last sample X may stand
+  EXPECT_EQ(left_out(flags[2]), 0U);
+}
+
+TEST(Comparable, NotWhatIsMissingInEither) {
+  RecordedRamp run(ramp(0.05));
+  run.measured[0][7] = kMissing;
+  run.predicted[0][9] = kMissing;
+  const auto flags = run.comparable();
+  EXPECT_EQ(left_out(flags[0]), 2U);
+  EXPECT_FALSE(flags[0][7] || flags[0][9]);
+}
+
+TEST(Comparable, NotTheForceOfAnAxisThatStands) {
+  std::vector<double> x = ramp(0.05);
+  for (std::size_t k = 1000; k < kSamples; ++k) x[k] = x[1000];
+  const auto flags = RecordedRamp(x).comparable();
+  EXPECT_EQ(left_out(flags[0]), 0U);  // its position can be
+  EXPECT_TRUE(flags[1][970]);
+  EXPECT_FALSE(flags[1][1010] || flags[1][1999]);
+}
+
+TEST(Comparable, NotReadingsAboutTheMomentOfTouching) {
+  RecordedRamp run(ramp(0.05));
+  for (std::size_t k = 0; k < 800; ++k) run.measured[2][k] = run.predicted[2][k] = 0;
+  const auto flags = run.comparable();
+  EXPECT_EQ(left_out(flags[2]), 100U);
+  EXPECT_TRUE(flags[2][749] && flags[2][850]);
+  EXPECT_FALSE(flags[2][750] || flags[2][849]);
+  EXPECT_EQ(left_out(flags[0]), 0U);
+}
+
+TEST(Comparable, AReadingThatGoesThroughZeroIsNoTouch) {
+  RecordedRamp run(ramp(0.05));
+  for (std::size_t k = 0; k < kSamples; ++k)
+    run.measured[2][k] = run.predicted[2][k] = 100e-6 * std::cos(static_cast<double>(k) / 100);
+  EXPECT_EQ(left_out(run.comparable()[2]), 0U);
+}
+
+TEST(Comparable, NotReadingsThatJumpWhileTheBallSlidesSlowly) {
+  for (const double speed : {0.005, 0.05}) {
+    RecordedRamp run(ramp(speed));
+    for (std::size_t k = 1000; k < 1020; ++k) run.measured[2][k] += k % 2 == 0 ? 5e-6 : -5e-6;
+    const auto flags = run.comparable();
+    EXPECT_EQ(flags[2][1010], speed > 0.02) << speed;
+    EXPECT_TRUE(flags[2][900] && flags[2][1100]);
+    EXPECT_EQ(left_out(flags[0]), 0U);
+  }
+}
+
+}  // namespace
+}  // namespace vcnc
