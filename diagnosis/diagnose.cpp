@@ -50,10 +50,7 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
     before.slip = find_period_slip(raw, of.replica.channels(), of.replica.predict(declared),
                                    declared.probe.signal_period);
   if (before.slip) declared.effects.get<PeriodSlip>() = *before.slip;
-  Evidence evidence(of.record, of.replica, declared,
-                    difference ? MoreNoise{difference->noise_scale,
-                                           difference->noise_scale * difference->lap_scatter}
-                               : MoreNoise{});
+  Evidence evidence(of.record, of.replica, declared, difference ? difference->noise_scale : 1);
   before.chatter = find_chatter(evidence, declared, of.candidates,
                                 difference ? difference->lines : std::vector<NoiseLine>{});
   for (const Chatter& c : before.chatter) {

@@ -76,26 +76,23 @@ Record without_outliers(Record record, const Replica& replica, const Machine& de
   return record;
 }
 
-/// The declared machine with the piece where it was clamped for a run; what its laps differ by.
-std::tuple<Machine, std::vector<NoiseLine>, Eigen::Vector3d> as_clamped(const Record& run,
-                                                                        Replica& replica,
-                                                                        const Machine& declared) {
+/// The declared machine with the piece where it was clamped for a run; what vibrates in it.
+std::pair<Machine, std::vector<NoiseLine>> as_clamped(const Record& run, Replica& replica,
+                                                      const Machine& declared) {
   const Record record = without_outliers(run, replica, declared);
   Evidence evidence(record, replica, declared);
   std::vector<FreedNumber> clamping = nuisances(declared);
   std::erase_if(clamping,
                 [](const FreedNumber& n) { return !n.number.key.starts_with("effects.setup."); });
-  return {fit_numbers(evidence, declared, std::move(clamping)).machine, evidence.noise().lines,
-          evidence.lap_scatter()};
+  return {fit_numbers(evidence, declared, std::move(clamping)).machine, evidence.noise().lines};
 }
 
 }  // namespace
 
 DifferentialRecord less_healthy(const Record& now, const Record& healthy, Replica& of_healthy,
                                 const Machine& declared) {
-  DifferentialRecord result{.record = now, .lap_scatter = {}, .lines = {}, .healthy = {}};
-  std::tie(result.healthy, result.lines, result.lap_scatter) =
-      as_clamped(healthy, of_healthy, declared);
+  DifferentialRecord result{.record = now, .lines = {}, .healthy = {}};
+  std::tie(result.healthy, result.lines) = as_clamped(healthy, of_healthy, declared);
   const Prediction predicted = of_healthy.predict(result.healthy);
   const std::vector<ComparedChannel>& channels = of_healthy.channels();
   std::size_t fewest = 0, unmatched = 0;

@@ -11,7 +11,6 @@
 // either. The noise of the reference stays in: variances grow by 1 + 1/n for n laps.
 #pragma once
 
-#include <Eigen/Dense>
 #include <vector>
 
 #include "diagnosis/records/record.hpp"
@@ -26,8 +25,7 @@ struct DifferentialRecord {
   Record record;
   double noise_scale = 1;  ///< of the standard deviation
   PerAxis<double> off{};  ///< RMS of a reading of the probe less yhat in the healthy run, x y z [m]
-  Eigen::Vector3d lap_scatter = Eigen::Vector3d::Zero();  ///< Evidence::lap_scatter() of that run
-  std::vector<NoiseLine> lines;                           ///< what vibrates in the healthy run
+  std::vector<NoiseLine> lines;  ///< what vibrates in the healthy run
   Machine healthy;  ///< what the record is held against instead of the declared machine
 };
 

@@ -49,13 +49,12 @@ Column less(const Column& z, const std::vector<Column>& columns, const Eigen::Ve
 }
 
 Evidence::Evidence(const Record& record, Replica& replica, const Machine& declared,
-                   const MoreNoise& more)
+                   double noise_scale)
     : record_(record),
       replica_(replica),
       gathering_(replica),
       partition_(vcnc::partition(record)),
-      declared_(replica.predict(declared)),
-      lap_scatter_(Eigen::Vector3d::Zero()) {
+      declared_(replica.predict(declared)) {
   for (const ComparedChannel& channel : replica.channels()) {
     const MeasuredSignal* signal = record.find(channel.kind, channel.axis);
     if (!signal) throw std::logic_error("a replica predicts a channel that the record has not");
@@ -70,25 +69,17 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
   const std::vector<Stretch>& laps = partition_.stretches;
   const std::vector<SeriesOfChannels> per_shift =
       readings_per_shift(with_piece_shifted(declared, kShift));
-  Eigen::Vector3d shift = more.shift;
-  if (!per_shift.empty()) {
-    lap_scatter_ = scatter_of(laps, lap_shifts(laps, per_shift, difference));
-    if (!rounding.empty())
-      shift =
-          (shift.array().square() + rms_of(lap_shifts(laps, per_shift, rounding)).array().square())
-              .sqrt();
-    // A piece or an axis that drifts from lap to lap is no noise of the samples.
-    if (partition_.repeated) {
-      std::vector<SeriesOfChannels> either =
-          readings_per_shift(with_axes_shifted(declared, kShift));
-      either.insert(either.end(), per_shift.begin(), per_shift.end());
-      take_out_shifts(laps, either, difference);
-    }
+  // A piece or an axis that drifts from lap to lap is no noise of the samples.
+  if (partition_.repeated && !per_shift.empty()) {
+    std::vector<SeriesOfChannels> either = readings_per_shift(with_axes_shifted(declared, kShift));
+    either.insert(either.end(), per_shift.begin(), per_shift.end());
+    take_out_shifts(laps, either, difference);
   }
   noise_ = audit_noise(record, partition_, replica.channels(), difference, rounding);
-  for (ChannelNoise& channel : noise_.channels) channel.filter.scale *= more.scale;
+  for (ChannelNoise& channel : noise_.channels) channel.filter.scale *= noise_scale;
   count_valid();
-  if (!shift.isZero()) whiten_shifts(per_shift, shift);
+  if (!rounding.empty() && !per_shift.empty())
+    whiten_shifts(per_shift, rms_shift(laps, per_shift, rounding));
 }
 
 void Evidence::count_valid() {

@@ -5,8 +5,8 @@
 // with W the whitening of every channel (noise_audit.hpp). All that fitting, choosing and judging
 // needs are products of such columns, kept per block of the partition: from them come chi-square on
 // fitted and held-out laps, normal equations, gains per condition and resampled laps.
-// Shifts of the piece from lap to lap are whitened in addition (lap_shifts.hpp): as large as the
-// rounding of encoders makes them, and as between laps of a healthy run.
+// Shifts of the piece from lap to lap, as large as the rounding of encoders makes them, are
+// whitened in addition (lap_shifts.hpp).
 //
 // Only samples that can be compared count (comparable.hpp), and none outside every stretch.
 #pragma once
@@ -49,13 +49,6 @@ class Column {
 /// z less the sum of step_i columns_i.
 Column less(const Column& z, const std::vector<Column>& columns, const Eigen::VectorXd& step);
 
-/// What noise there is beyond what laps tell.
-struct MoreNoise {
-  double scale = 1;  ///< of the standard deviation of samples
-  /// By which the piece lies elsewhere from lap to lap, x y z [m].
-  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
-};
-
 /// Products of columns, one matrix per block.
 using BlockGrams = std::vector<Eigen::MatrixXd>;
 
@@ -64,16 +57,14 @@ enum class Role { fitted, held_out, both };
 class Evidence {
  public:
   /// `declared` says which samples can be compared at all, and gives the residual whose repetitions
-  /// tell the noise. The references must outlive this.
-  Evidence(const Record& record, Replica& replica, const Machine& declared,
-           const MoreNoise& more = {});
+  /// tell the noise; `noise_scale` is what its standard deviation grows by beyond what laps tell.
+  /// The references must outlive this.
+  Evidence(const Record& record, Replica& replica, const Machine& declared, double noise_scale = 1);
 
   const Record& record() const { return record_; }
   const Replica& replica() const { return replica_; }
   const Partition& partition() const { return partition_; }
   const NoiseAudit& noise() const { return noise_; }
-  /// How far apart the piece lies in laps of one condition, x y z [m].
-  const Eigen::Vector3d& lap_scatter() const { return lap_scatter_; }
 
   Prediction predict(const Machine& hypothesis) const;
   /// As many at a time as are worth it.
@@ -142,7 +133,6 @@ class Evidence {
   std::vector<std::vector<char>> raw_valid_, valid_;
   std::vector<double> fitted_count_, held_out_count_;  ///< of valid_, per channel
   NoiseAudit noise_;
-  Eigen::Vector3d lap_scatter_;
   ShiftWhitening of_shifts_;
 };
 

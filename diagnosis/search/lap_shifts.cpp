@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 #include <utility>
 
@@ -23,8 +22,13 @@ void fill_row(const std::vector<SeriesOfChannels>& per_shift, const Stretch& lap
   }
 }
 
-Eigen::VectorXd shift_of(const Stretch& lap, const std::vector<SeriesOfChannels>& per_shift,
-                         const SeriesOfChannels& series) {
+struct LapShift {
+  Eigen::VectorXd shift;
+  Eigen::VectorXd weight;  ///< sum of squares of what each makes of the lap
+};
+
+LapShift shift_of(const Stretch& lap, const std::vector<SeriesOfChannels>& per_shift,
+                  const SeriesOfChannels& series) {
   const auto columns = static_cast<Eigen::Index>(2 * per_shift.size());
   Eigen::MatrixXd products = Eigen::MatrixXd::Zero(columns, columns);
   Eigen::VectorXd with_series = Eigen::VectorXd::Zero(columns), x(columns);
@@ -37,8 +41,9 @@ Eigen::VectorXd shift_of(const Stretch& lap, const std::vector<SeriesOfChannels>
       with_series += x * series[c][k];
     }
   }
+  const Eigen::VectorXd weight = products.diagonal();
   products.diagonal().array() += 1e-9 * products.diagonal().maxCoeff() + 1e-300;
-  return products.ldlt().solve(with_series);
+  return {products.ldlt().solve(with_series), weight};
 }
 
 }  // namespace
@@ -68,18 +73,22 @@ std::vector<Machine> with_axes_shifted(const Machine& machine, double by) {
   return all;
 }
 
-std::vector<Eigen::Vector3d> lap_shifts(const std::vector<Stretch>& laps,
-                                        const std::vector<SeriesOfChannels>& per_shift,
-                                        const SeriesOfChannels& series) {
-  std::vector<Eigen::Vector3d> shifts;
-  for (const Stretch& lap : laps) shifts.push_back(shift_of(lap, per_shift, series).head<3>());
-  return shifts;
+Eigen::Vector3d rms_shift(const std::vector<Stretch>& laps,
+                          const std::vector<SeriesOfChannels>& per_shift,
+                          const SeriesOfChannels& series) {
+  Eigen::Array3d sum = Eigen::Array3d::Zero(), weights = Eigen::Array3d::Constant(1e-300);
+  for (const Stretch& lap : laps) {
+    const LapShift s = shift_of(lap, per_shift, series);
+    sum += s.weight.head<3>().array() * s.shift.head<3>().array().square();
+    weights += s.weight.head<3>().array();
+  }
+  return (sum / weights).sqrt();
 }
 
 void take_out_shifts(const std::vector<Stretch>& laps,
                      const std::vector<SeriesOfChannels>& per_shift, SeriesOfChannels& series) {
   for (const Stretch& lap : laps) {
-    const Eigen::VectorXd shift = shift_of(lap, per_shift, series);
+    const Eigen::VectorXd shift = shift_of(lap, per_shift, series).shift;
     Eigen::VectorXd x(shift.size());
     for (std::size_t c = 0; c < series.size(); ++c) {
       if (per_shift[0][c].empty()) continue;
@@ -89,28 +98,6 @@ void take_out_shifts(const std::vector<Stretch>& laps,
       }
     }
   }
-}
-
-Eigen::Vector3d rms_of(const std::vector<Eigen::Vector3d>& shifts) {
-  Eigen::Array3d sum = Eigen::Array3d::Zero();
-  for (const Eigen::Vector3d& s : shifts) sum += s.array().square();
-  return (sum / std::max<double>(1, static_cast<double>(shifts.size()))).sqrt();
-}
-
-Eigen::Vector3d scatter_of(const std::vector<Stretch>& laps,
-                           const std::vector<Eigen::Vector3d>& shifts) {
-  std::map<int, std::vector<Eigen::Vector3d>> of_condition;
-  for (std::size_t i = 0; i < laps.size(); ++i)
-    of_condition[laps[i].condition].push_back(shifts[i]);
-  Eigen::Array3d sum = Eigen::Array3d::Zero();
-  double freedom = 0;
-  for (const auto& [condition, of] : of_condition) {
-    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    for (const Eigen::Vector3d& s : of) mean += s / static_cast<double>(of.size());
-    for (const Eigen::Vector3d& s : of) sum += (s - mean).array().square();
-    freedom += static_cast<double>(of.size()) - 1;
-  }
-  return freedom > 0 ? Eigen::Vector3d((sum / freedom).sqrt()) : Eigen::Vector3d::Zero();
 }
 
 ShiftWhitening::ShiftWhitening(std::vector<Stretch> laps, const std::vector<Channels>& per_shift)

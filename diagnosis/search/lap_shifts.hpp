@@ -28,21 +28,15 @@ using SeriesOfChannels = std::vector<std::vector<double>>;
 std::vector<Machine> with_piece_shifted(const Machine& machine, double by);
 std::vector<Machine> with_axes_shifted(const Machine& machine, double by);
 
-/// Least-squares shifts of the laps, in the unit that `per_shift` is per: one element for x, y, z
-/// each. Shifts that grow during the lap are fitted along.
-std::vector<Eigen::Vector3d> lap_shifts(const std::vector<Stretch>& laps,
-                                        const std::vector<SeriesOfChannels>& per_shift,
-                                        const SeriesOfChannels& series);
+/// RMS over the laps of the shifts in x, y, z that explain `series` best beside such that grow
+/// during a lap, in the unit that the three `per_shift` are per; laps count by how well they tell.
+Eigen::Vector3d rms_shift(const std::vector<Stretch>& laps,
+                          const std::vector<SeriesOfChannels>& per_shift,
+                          const SeriesOfChannels& series);
 
 /// Takes out of every lap what shifts, constant or growing, make of it; any number of them.
 void take_out_shifts(const std::vector<Stretch>& laps,
                      const std::vector<SeriesOfChannels>& per_shift, SeriesOfChannels& series);
-
-/// RMS of shifts per direction: about zero, or of laps of one condition about their mean (0 where
-/// none is repeated).
-Eigen::Vector3d rms_of(const std::vector<Eigen::Vector3d>& shifts);
-Eigen::Vector3d scatter_of(const std::vector<Stretch>& laps,
-                           const std::vector<Eigen::Vector3d>& shifts);
 
 /// Whitens what a shift makes of a lap.
 class ShiftWhitening {
