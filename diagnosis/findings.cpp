@@ -379,7 +379,8 @@ class Report {
                     of_.candidates[c.candidate].name();
         if (likely.empty()) likely = fmt::format(" No effect on the drive of {} does so", axis);
         d_.notes.push_back(text + "." + likely + ".");
-        unnamed_chatter_ = true;
+        d_.vibrations.push_back(
+            fmt::format("{} vibrates by itself at {:.0f} Hz", axis, chatter.line.frequency));
         continue;
       }
       const ChatterCause& cause = chatter.causes.front();
@@ -613,7 +614,7 @@ class Report {
     using enum DiagnosisVerdict;
     if (evidence_.count(Role::held_out) < 200 || (!excited && !named && ratio < kQuiet))
       d_.verdict = not_identifiable;
-    else if (d_.law || unnamed_chatter_)
+    else if (d_.law || !d_.vibrations.empty())
       d_.verdict = named ? partly : unexplained;
     else if (!evidence_.noise().from_repetitions)
       d_.verdict = named ? explained : no_deviation;
@@ -641,7 +642,6 @@ class Report {
   double floor_;
   double law_gain_ = 0;
   bool withdrawn_ = false;
-  bool unnamed_chatter_ = false;
   Diagnosis d_;
 };
 

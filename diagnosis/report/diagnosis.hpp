@@ -77,6 +77,7 @@ struct Diagnosis {
   double explained_share = 0, model_form_share = 0;
   std::vector<FoundEffect> effects;  ///< by what they do to the contour error
   std::optional<LearnedLaw> law;
+  std::vector<std::string> vibrations;  ///< "X vibrates by itself at 83 Hz", of unknown cause
   std::vector<SignalFigure> figures;
   std::vector<Excitation> excitation;
   std::vector<Rung> ladder;

@@ -81,6 +81,7 @@ std::string to_json(const Diagnosis& d, const std::string& source) {
                   {"model_form_share", finite(d.model_form_share)},
                   {"effects", list(d.effects, effect)},
                   {"law", d.law ? learned(*d.law) : Json()},
+                  {"vibrations", d.vibrations},
                   {"figures", list(d.figures, figure)},
                   {"ladder", list(d.ladder, rung)},
                   {"excitation", list(d.excitation, excitation)},

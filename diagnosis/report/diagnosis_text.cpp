@@ -62,8 +62,9 @@ std::string verdict_sentence(const Diagnosis& d) {
                             d.model_form_share * 100)
               : "");
     case DiagnosisVerdict::unexplained:
-      return d.law ? d.law->words
-                   : std::string("something is there that nothing in the library explains");
+      if (d.law) return d.law->words;
+      if (!d.vibrations.empty()) return fmt::to_string(fmt::join(d.vibrations, ", "));
+      return "something is there that nothing in the library explains";
     case DiagnosisVerdict::no_deviation:
       return "the machine does what is declared, within what this run can show";
     case DiagnosisVerdict::not_identifiable:

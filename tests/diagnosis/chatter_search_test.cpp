@@ -1,11 +1,13 @@
 #include "diagnosis/search/chatter_search.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/report/diagnosis_text.hpp"
 #include "diagnosis/search/differential.hpp"
 #include "model/math.hpp"
 #include "toy_machine.hpp"
@@ -78,6 +80,7 @@ TEST(ChatterSearch, OnlyHintsAtWhatVibratesOtherwise) {
     const Diagnosis d = diagnosed(vibrating(hertz, um, 2));
     EXPECT_TRUE(d.effects.empty());
     EXPECT_EQ(d.verdict, DiagnosisVerdict::unexplained);
+    EXPECT_EQ(verdict_sentence(d), fmt::format("X vibrates by itself at {:.0f} Hz", hertz));
     ASSERT_EQ(d.notes.size(), 1U);
     EXPECT_EQ(d.notes[0].find("X vibrates by itself: position X"), 0U) << d.notes[0];
     EXPECT_EQ(d.notes[0].find("X.load_play") != std::string::npos, hertz == kHertz) << d.notes[0];
