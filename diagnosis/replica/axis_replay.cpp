@@ -145,12 +145,14 @@ WatchedReplay replay_watched(const Machine& hypothesis, const Machine& actual, s
 
 std::optional<AxisReplay> displaced(const WatchedReplay& drive, const Machine& hypothesis,
                                     const Machine& actual, std::size_t axis) {
-  const bool laws = std::any_of(
+  const bool of_motions = std::any_of(
       hypothesis.effects.laws.begin(), hypothesis.effects.laws.end(), [&](const Law& law) {
-        return law.axis_index() == axis && law.point == Law::Point::displacement;
+        return law.axis_index() == axis && law.point == Law::Point::displacement &&
+               (law.over != Covariate::time || law.times != Covariate::time);
       });
+  const Motions<double> unasked{};
   Chain<DisplacementPort> chain = axis_chain<DisplacementPort>(hypothesis.effects, axis, kSeed);
-  if (laws || drive.late.empty() || chain.remembers()) return std::nullopt;
+  if (of_motions || drive.late.empty() || chain.remembers()) return std::nullopt;
   AxisReplay replay = drive.replay;
   std::fill_n(replay.truth.begin(), kLateTruth, start_position(actual, kSeed)[axis]);
   for (std::size_t s = kLateTruth; s < drive.late.size(); ++s) {
@@ -163,7 +165,7 @@ std::optional<AxisReplay> displaced(const WatchedReplay& drive, const Machine& h
                {.moment = {static_cast<double>(count) * kDriveLoopTime, kDriveLoopTime, count},
                 .load = load.load,
                 .force = load.force,
-                .axes = nullptr});
+                .axes = &unasked});
     replay.truth[s] = load.load.position + signal.displacement;
   }
   return replay;

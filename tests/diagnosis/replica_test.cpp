@@ -74,6 +74,15 @@ TEST(MachineReplica, SeveralAtATimeAreAsAlone) {
   on_x(PitchPeriodic::nominal(false));  // move the tool centre, not the drive
   on_x(ThermalDrift::nominal(false));
   on_x(LoadPlay::nominal(false));  // remembers
+  Law law;
+  law.point = Law::Point::displacement;
+  law.at = {0, 5};
+  law.value = {1e-6, 3e-6};
+  for (const Covariate over : {Covariate::time, Covariate::position}) {
+    law.over = over;
+    all.push_back(run.declared);
+    all.back().effects.laws.push_back(law);
+  }
   all.push_back(all.front());
   all.back().effects.get<ContactLoss>() = ContactLoss::nominal();  // needs the probe in full
   const std::vector<Prediction> together = replica.predict_all(all);
