@@ -19,6 +19,13 @@ double step_at(const Series& r, std::size_t k) {
   return step / kReach;
 }
 
+/// Whether the reading hardly moves from sample to sample but from k - 1 to k.
+bool sudden(const Series& r, std::size_t k, double most) {
+  for (std::size_t i = k + 1 - kReach; i < k + kReach; ++i)
+    if (i != k && !(std::abs(r[i] - r[i - 1]) < most)) return false;
+  return true;
+}
+
 /// Whole periods in a step, 0: it is none.
 int periods_in(double step, double period) {
   const double n = std::round(step / period);
@@ -59,7 +66,8 @@ std::optional<PeriodSlip> find_period_slip(const Record& record,
     const Series& r = residual[c];
     for (std::size_t k = kReach; k + kReach <= r.size(); ++k) {
       const int n = periods_in(r[k] - r[k - 1], period);
-      if (n == 0 || periods_in(step_at(r, k), period) != n || !stays(record, r, k, n * period))
+      if (n == 0 || !sudden(r, k, kQuietBeside * period) ||
+          periods_in(step_at(r, k), period) != n || !stays(record, r, k, n * period))
         continue;
       const bool alone = std::all_of(residual.begin(), residual.end(), [&](const Series& other) {
         return &other == &r || !(std::abs(other[k] - other[k - 1]) > kQuietBeside * period);

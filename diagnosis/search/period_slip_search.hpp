@@ -3,9 +3,9 @@
 //
 // Sought in what is measured less what the declared machine predicts, in all samples, those between
 // laps included. A step counts if it is within 15 % of a whole number of periods, over one sample
-// and between the means of five before and after it, if no other channel takes part, if what
-// follows is nearer to nothing without it, and if it is the only one: slips that come and go are no
-// slips.
+// and between the means of five before and after it, if these hardly move among themselves (a ball
+// that rings or turns over does), if no other channel takes part, if what follows is nearer to
+// nothing without it, and if it is the only one: slips that come and go are no slips.
 #pragma once
 
 #include <optional>

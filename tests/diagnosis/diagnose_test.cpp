@@ -284,6 +284,8 @@ TEST(PeriodSlipSearch, TakesOneStepOfWholePeriodsThatStays) {
   EXPECT_FALSE(stepped({{1, 700, kPeriod}, {1, 701, -kPeriod}}));       // a spike
   EXPECT_FALSE(stepped({{1, 700, kPeriod}, {1, 900, -kPeriod}}));       // comes and goes
   EXPECT_FALSE(stepped({{1, 700, kPeriod}, {0, 700, 0.5 * kPeriod}}));  // the ball itself moved
+  // A ball that rings: the means differ by one period, but it moves before and after, too.
+  EXPECT_FALSE(stepped({{1, 696, 0.4 * kPeriod}, {1, 697, -0.4 * kPeriod}, {1, 700, kPeriod}}));
 }
 
 TEST(Diagnose, NamesProgramsThatThereAre) {
