@@ -25,7 +25,7 @@ constexpr double kShareOfFound = 0.005;
 constexpr double kChangeOfForm = 0.05;
 
 /// Effects that are told between two runs of one machine: more are a law that nobody has named.
-constexpr std::size_t kMostChanges = 5;
+constexpr std::size_t kMostChanges = 5, kFewChanges = 3;
 
 /// Chi-square of the held-out laps that this makes.
 std::vector<double> forms_of(const Evidence& evidence, const DifferentialRecord& difference) {
@@ -59,6 +59,7 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
   }
   if (difference) {
     options.max_effects = std::min(options.max_effects, kMostChanges);
+    options.few_effects = std::min(options.few_effects, kFewChanges);
     options.form_of_channel = forms_of(evidence, *difference);
     options.form_um = 1e6 * kChangeOfForm *
                       std::hypot(difference->off[0], difference->off[1], difference->off[2]);

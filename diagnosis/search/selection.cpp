@@ -18,6 +18,7 @@ constexpr std::size_t kAttempts = 3;      ///< contenders that are fitted togeth
 constexpr std::size_t kAlternatives = 1;  ///< other beginnings
 constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to look for another one
 constexpr std::size_t kImitation = 3;  ///< names that are too many where one law does better
+constexpr double kHalf = 0.5;          ///< of what is left, see DiagnosisOptions::few_effects
 constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
 
 class Search {
@@ -78,7 +79,11 @@ class Search {
       if (now.added.size() + now.released.size() >= options_.max_effects) break;
       if (imitates(now)) break;
       Contest contest(rules_, now);
-      if (!accept_one(now, contest.contenders(), contest)) break;
+      const std::vector<Contender> next = contest.contenders();
+      if (now.added.size() + now.released.size() >= options_.few_effects && !next.empty() &&
+          next.front().gain < kHalf * rules_.excess(now.held_out))
+        break;
+      if (!accept_one(now, next, contest)) break;
     }
     return now;
   }

@@ -202,6 +202,39 @@ TEST(Selection, StandInsForEachOtherAllGo) {
   EXPECT_NEAR(number_of(result.found.machine, "effects.Y.load_play.width_um"), 1, 0.02);
 }
 
+TEST(Selection, ManyThatDoALittleEachAreNotTold) {
+  const std::vector<const char*> keys{"effects.X.load_play.width_um",
+                                      "effects.Y.load_play.width_um",
+                                      "effects.Z.load_play.width_um",
+                                      "effects.X.lost_motion.compliance_nm_per_N",
+                                      "effects.Y.lost_motion.compliance_nm_per_N",
+                                      "effects.Z.lost_motion.compliance_nm_per_N",
+                                      "effects.X.backlash.gap_um"};
+  Record record = toy::commands(1000, 4);
+  std::vector<WaveReplica::Wave> waves;
+  Machine truth;
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    waves.push_back({keys[i], std::vector<double>(i + 1, 0.0)});
+    waves.back().harmonics.back() = 1;  // a wave of its own
+    move_number(truth, keys[i], 1);
+  }
+  WaveReplica replica(record.samples(), waves);
+  std::vector<double> reading = replica.predict(truth)[0];
+  for (std::size_t k = 0; k < reading.size(); ++k)
+    reading[k] += toy::kProbeNoise * gaussian_noise(15, 0, k)[0];
+  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+  for (const std::size_t few : {1U, 8U}) {
+    Evidence evidence(record, replica, {});
+    DiagnosisOptions options;
+    options.few_effects = few;
+    const SelectionResult result =
+        select_effects_of(evidence, {}, replica.candidates(), options, {});
+    // A pair explains two of seven, the next two of five.
+    EXPECT_EQ(result.found.added.size() <= 2, few == 1);
+    EXPECT_EQ(result.found.added.size() == 7, few == 8);
+  }
+}
+
 TEST(FitDeclared, LeavesNoMoreThanTheDeclarationWhateverIsWrong) {
   for (const double wrong : {1e-6, 1e-4, 1e-2}) {
     Record record = toy::commands(500, 4);
