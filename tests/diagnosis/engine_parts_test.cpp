@@ -183,21 +183,45 @@ TEST(CountedGain, DoubtsALawLessThatWasSeenToBeRight) {
   EXPECT_NEAR(doubt[1], 40, 1e-6);
 }
 
-TEST(Threshold, CountsWhatIsLeftInTheChannelsThatGain) {
-  Record record = toy::commands(400, 4);
-  toy::measure(record, Machine(), 1);
-  toy::ToyReplica replica(record);
-  const Evidence evidence(record, replica, Machine());
-  const std::vector<Candidate> none;
+/// Rules of a contest about a machine of which nothing is off.
+struct QuietContest {
+  Record record = measured_record();
+  toy::ToyReplica replica{record};
+  Evidence evidence{record, replica, Machine()};
+  std::vector<Candidate> none;
   std::vector<TrialColumns> trials;
   DiagnosisOptions options;
-  options.least_gain = 25;
-  options.least_share = 0.02;
-  const ContestRules rules{evidence, none, options, trials, {}, 2000, {1000, 1000}, {}};
+
+  static Record measured_record() {
+    Record record = toy::commands(400, 4);
+    toy::measure(record, Machine(), 1);
+    return record;
+  }
+  ContestRules rules(double floor, std::vector<double> floor_of) {
+    return {evidence, none, options, trials, {}, floor, std::move(floor_of), {}};
+  }
+};
+
+TEST(Threshold, CountsWhatIsLeftInTheChannelsThatGain) {
+  QuietContest contest;
+  contest.options.least_gain = 25;
+  contest.options.least_share = 0.02;
+  const ContestRules rules = contest.rules(2000, {1000, 1000});
   // 100000 are left in the other channel, which gains nothing.
   EXPECT_DOUBLE_EQ(rules.threshold({101000, 3000}, {101000, 1500}), 0.02 * 2000);
   EXPECT_DOUBLE_EQ(rules.threshold({101000, 3000}, {91000, 1500}), 0.02 * 102000);
   EXPECT_DOUBLE_EQ(rules.threshold({101000, 1100}, {101000, 1000}), 25);
+}
+
+TEST(Threshold, WhatDoesNotStandOutOfTheLapsIsNotTold) {
+  QuietContest contest;
+  const ContestRules rules = contest.rules(0, {0, 0, 0});
+  const double n = contest.evidence.count(0, Role::held_out);
+  // A gain of 1000 in the first channel: above what laps differ by, at it, and far below.
+  EXPECT_TRUE(rules.stands_out({n + 1000, n, n}, {n, n, n}));
+  EXPECT_FALSE(rules.stands_out({n, n, n}, {n - 1000, n, n}));
+  EXPECT_FALSE(rules.stands_out({n, 3 * n, n}, {n - 1000, 3 * n, n}));
+  EXPECT_TRUE(rules.stands_out({n, n, n}, {n - 100, n, n}));  // less than chance makes
 }
 
 TEST(Screening, DetectionLimitIsWhereTheHeldOutHalfGainsEnough) {

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <functional>
 
-#include "diagnosis/search/contest.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "model/probe/noise.hpp"
 #include "tests/diagnosis/toy_machine.hpp"
@@ -118,23 +117,6 @@ TEST(Evidence, ShiftsThatRoundingMakesAreNoise) {
   };
   EXPECT_GT(above(trusting), 10);
   EXPECT_LT(std::abs(above(knowing)), 0.05);
-}
-
-TEST(Contest, WhatDoesNotStandOutIsNotTold) {
-  Record record = toy::commands(400, 4);
-  toy::measure(record, Machine(), 1);
-  toy::ToyReplica replica(record);
-  const Evidence evidence(record, replica, Machine());
-  const std::vector<Candidate> none;
-  std::vector<TrialColumns> trials;
-  const DiagnosisOptions options;
-  const ContestRules rules{evidence, none, options, trials, {}, 0, {0, 0, 0}, {}};
-  const double n = evidence.count(0, Role::held_out);
-  // A gain of 1000 in the first channel: above what laps differ by, at it, and far below.
-  EXPECT_TRUE(rules.stands_out({n + 1000, n, n}, {n, n, n}));
-  EXPECT_FALSE(rules.stands_out({n, n, n}, {n - 1000, n, n}));
-  EXPECT_FALSE(rules.stands_out({n, 3 * n, n}, {n - 1000, 3 * n, n}));
-  EXPECT_TRUE(rules.stands_out({n, n, n}, {n - 100, n, n}));  // less than chance makes
 }
 
 }  // namespace
