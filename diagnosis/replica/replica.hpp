@@ -42,6 +42,8 @@ class SharedSeries {
 
 /// One series per channel in SI; what a change left alone is shared with what was before.
 using Prediction = std::vector<SharedSeries>;
+/// The same of numbers that were measured, or changed; NaN where there is nothing to compare.
+using SeriesOfChannels = std::vector<std::vector<double>>;
 
 class Replica {
  public:

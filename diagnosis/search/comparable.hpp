@@ -10,7 +10,6 @@
 
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
-#include "diagnosis/search/lap_shifts.hpp"
 
 namespace vcnc {
 

@@ -17,12 +17,10 @@
 #include <vector>
 
 #include "diagnosis/records/record.hpp"
+#include "diagnosis/replica/replica.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {
-
-/// One series per channel in SI, NaN where there is nothing to compare.
-using SeriesOfChannels = std::vector<std::vector<double>>;
 
 /// The piece shifted in x, y, z; the tool centre shifted along X, Y, Z, each [m].
 std::vector<Machine> with_piece_shifted(const Machine& machine, double by);
