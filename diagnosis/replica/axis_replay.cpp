@@ -60,6 +60,42 @@ class Commands {
   AxisVector start_;
 };
 
+/// Says when a drive has come to rest: its set-point stands, and in a while nothing that it tells
+/// has changed by more than rounding does.
+template <class Real>
+class Rest {
+ public:
+  bool comes(const Command& command, const AxisCycleOf<Real>& cycle, std::size_t axis) {
+    const bool stands = command.velocity[axis] == 0 && command.position[axis] == commanded_;
+    const bool still = stands && same(cycle.measured, last_.measured, kPosition) &&
+                       same(cycle.second, last_.second, kPosition) &&
+                       same(cycle.truth.back(), last_.truth.back(), kPosition) &&
+                       same(cycle.force, last_.force, kForce);
+    commanded_ = command.position[axis];
+    last_ = cycle;
+    cycles_ = still ? cycles_ + 1 : 0;
+    return cycles_ >= kCycles;
+  }
+  /// Whether the drive, at rest, is told nothing new.
+  bool lasts(const Command& command, std::size_t axis) const {
+    return command.velocity[axis] == 0 && command.position[axis] == commanded_;
+  }
+
+ private:
+  static constexpr double kPosition = 1e-14;  // [m or rad]
+  static constexpr double kForce = 1e-10;     // share of the limit
+  static constexpr std::size_t kCycles = 20;
+
+  static bool same(const Real& a, const Real& b, double within) {
+    using std::abs;
+    return all(abs(a - b) < Real(within));
+  }
+
+  double commanded_ = std::numeric_limits<double>::quiet_NaN();
+  AxisCycleOf<Real> last_;
+  std::size_t cycles_ = 0;
+};
+
 /// Replays on any number of lanes with `per_cycle` truths; after_cycle(k) is called after each.
 template <class Real, class F>
 std::vector<AxisReplay> replay_lanes(AxisDriveOf<Real>& drive, std::size_t axis,
@@ -77,11 +113,19 @@ std::vector<AxisReplay> replay_lanes(AxisDriveOf<Real>& drive, std::size_t axis,
     measured[n][0] = commands.start()[axis];
   }
   const double full_force = variants[0].hypothesis.axes[axis].mechanics.force_limit;
+  const bool can_rest = drive.can_rest();
+  bool rests = false;
+  Rest<Real> rest;
+  AxisCycleOf<Real> cycle;
   for (std::size_t k = 1; k < cycles; ++k) {
     const Command command = commands.at(k);
-    drive.tell_commands(command.position, command.velocity);
-    const AxisCycleOf<Real> cycle =
-        drive.follow({Real(command.position[axis]), Real(command.velocity[axis])});
+    if (rests && rest.lasts(command, axis)) {
+      drive.rest();
+    } else {
+      drive.tell_commands(command.position, command.velocity);
+      cycle = drive.follow({Real(command.position[axis]), Real(command.velocity[axis])});
+      rests = rest.comes(command, cycle, axis) && can_rest;
+    }
     for (std::size_t n = 0; n < lanes; ++n) {
       measured[n][k] = lane(cycle.measured, n);
       twist[n][k] = lane(cycle.second, n);

@@ -7,7 +7,6 @@
 
 #include "diagnosis/replica/model_comparison.hpp"
 #include "model/machine.hpp"
-#include "model/parameters.hpp"
 
 namespace vcnc {
 
@@ -26,18 +25,6 @@ std::string short_key(const std::string& key, const std::string& effect) {
 }
 
 }  // namespace
-
-std::string unit_of_key(const std::string& key) {
-  static const std::vector<std::pair<std::string, std::string>> units = [] {
-    Machine machine;
-    std::vector<std::pair<std::string, std::string>> all;
-    for (const Parameter& p : parameters(machine)) all.emplace_back(p.key, p.unit.suffix);
-    std::sort(all.begin(), all.end());
-    return all;
-  }();
-  const auto at = std::lower_bound(units.begin(), units.end(), std::pair(key, std::string()));
-  return at != units.end() && at->first == key ? at->second : "";
-}
 
 std::string with_interval(const FittedNumber& n) {
   const double width = n.high - n.low;

@@ -16,9 +16,6 @@ std::string figures_table(const std::vector<SignalFigure>& figures);
 /// What the verdict says, in one sentence.
 std::string verdict_sentence(const Diagnosis& diagnosis);
 
-/// Unit of a key's number: "um" of "gap_um", "" where it has none.
-std::string unit_of_key(const std::string& key);
-
 /// Value with as many digits as its interval deserves.
 std::string with_interval(const FittedNumber& number);
 

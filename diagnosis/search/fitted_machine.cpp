@@ -136,16 +136,20 @@ void linearise(const Evidence& evidence, FittedMachine& m, const std::vector<std
     m.nuisances.columns[which[i]] = std::move(columns[i]);
 }
 
-/// Takes sensitivities of `which` where the machine stands and fits, until that changes nothing.
+/// Takes sensitivities of `which` where the machine stands and fits, until that changes nothing, or
+/// would, if gains go on to shrink as they do; `gain` is that of the fit before.
 void fit_in_rounds(const Evidence& evidence, FittedMachine& m,
-                   const std::vector<std::size_t>& which) {
+                   const std::vector<std::size_t>& which,
+                   double gain = std::numeric_limits<double>::infinity()) {
   constexpr int kLinearisations = 3;
   constexpr double kSettled = 5;  // chi-square that no further one is worth
   for (int round = 0; round < kLinearisations; ++round) {
-    const double before = m.held_out;
+    const double before = m.held_out, last = gain;
     linearise(evidence, m, which);
     converge(evidence, m);
-    if (before - m.held_out < kSettled) break;
+    gain = before - m.held_out;
+    const double next = last > 0 && std::isfinite(last) ? gain * gain / last : gain;
+    if (gain < kSettled || next < kSettled) break;
   }
 }
 
@@ -220,9 +224,10 @@ FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
   }
   m.nuisances = std::move(shown);
   converge(evidence, m);
+  const double before = m.held_out;
   evidence.anchor(m.machine);
   converge(evidence, m);
-  fit_in_rounds(evidence, m, every(m));
+  fit_in_rounds(evidence, m, every(m), before - m.held_out);
   return m;
 }
 

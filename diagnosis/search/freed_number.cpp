@@ -98,6 +98,18 @@ bool has_key(const std::vector<FreedNumber>& numbers, const std::string& key) {
                      [&](const FreedNumber& n) { return n.number.key == key; });
 }
 
+std::string unit_of_key(const std::string& key) {
+  static const std::vector<std::pair<std::string, std::string>> units = [] {
+    Machine machine;
+    std::vector<std::pair<std::string, std::string>> all;
+    for (const Parameter& p : parameters(machine)) all.emplace_back(p.key, p.unit.suffix);
+    std::sort(all.begin(), all.end());
+    return all;
+  }();
+  const auto at = std::lower_bound(units.begin(), units.end(), std::pair(key, std::string()));
+  return at != units.end() && at->first == key ? at->second : "";
+}
+
 std::vector<FreedNumber> nuisances(const Machine& declared) {
   Machine copy = declared;
   std::vector<FreedNumber> all;

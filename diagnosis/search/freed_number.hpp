@@ -33,6 +33,8 @@ Machine with(Machine machine, const std::vector<FreedNumber>& numbers);
 /// Gives numbers the values that those of the same keys have in `from`.
 void adopt(std::vector<FreedNumber>& numbers, const std::vector<FreedNumber>& from);
 bool has_key(const std::vector<FreedNumber>& numbers, const std::string& key);
+/// Unit of a key's number: "um" of "gap_um", "" where it has none.
+std::string unit_of_key(const std::string& key);
 
 /// Declared numbers that are never exact, with their tolerances (standard deviations):
 ///

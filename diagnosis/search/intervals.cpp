@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/search/trial.hpp"
+
 namespace vcnc {
 namespace {
 
 constexpr double kNormal95 = 1.96;
 /// What the scatter of few conditions misses of the variance between them.
 constexpr double kFewConditions = 1.3;
-/// Standard deviation of a number, of its size, by the form of the law it belongs to.
+/// Standard deviation of a number, of the size of its effect, by the form of the law.
 constexpr double kKnownTo = 0.02;
 
 /// Two-sided 95 % quantile of Student's t: the expansion about the normal one (Abramowitz & Stegun
@@ -20,6 +22,20 @@ double student_95(double freedom) {
                g3 = z * (((3 * z2 + 19) * z2 + 17) * z2 - 15) / 384,
                g4 = z * ((((79 * z2 + 776) * z2 + 1482) * z2 - 1920) * z2 - 945) / 92160;
   return z + g1 / n + g2 / (n * n) + g3 / (n * n * n) + g4 / (n * n * n * n);
+}
+
+/// The largest amplitude of the effect of a number that has its unit: what a law gets wrong about
+/// one of them shows in the others. In the unit of the key.
+double size_of(const FittedMachine& machine, const FreedNumber& number) {
+  double largest = std::abs(number.value);
+  for (const AddedEffect& a : machine.added) {
+    if (!has_key(a.numbers, number.number.key) || number.shape || is_phase(number.number)) continue;
+    for (const FreedNumber& n : a.numbers)
+      if (!n.shape && !is_phase(n.number) &&
+          unit_of_key(n.number.key) == unit_of_key(number.number.key))
+        largest = std::max(largest, std::abs(n.value));
+  }
+  return largest;
 }
 
 /// Sum over the clusters of the squares of what each moves the numbers by.
@@ -75,9 +91,10 @@ std::map<std::string, Interval> intervals_of(const Evidence& evidence, const Fit
         kNormal95 *
         std::sqrt(std::max({0.0, ratio * inverse(i, i), enough ? between_blocks[i] : 0.0}));
     const double form =
-        inexact ? std::hypot(few * std::sqrt(between_conditions[i]),
-                             kNormal95 * kKnownTo * number.value / number.number.typical)
-                : 0;
+        inexact
+            ? std::hypot(few * std::sqrt(between_conditions[i]),
+                         kNormal95 * kKnownTo * size_of(machine, number) / number.number.typical)
+            : 0;
     intervals[number.number.key] = {std::hypot(noise, form) * number.number.typical};
   }
   return intervals;

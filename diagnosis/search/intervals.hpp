@@ -4,8 +4,8 @@
 // by, and of the scatter between blocks of a second (sandwich; White 1980). Where the model is
 // known not to be exact, two things are added in quadrature: the scatter between the conditions of
 // the run, by Student's t and 1.3 for what so few of them miss, since what a model gets wrong is
-// alike in all laps of a condition; and 4 % of the number, since no law of an effect is known
-// better than to two percent. Both were set on machines of the second generator.
+// alike in all laps of a condition; and 4 % of the largest amplitude of the effect, since no law of
+// an effect is known better than to two percent. Both were set on machines of the second generator.
 #pragma once
 
 #include <map>

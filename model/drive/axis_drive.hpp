@@ -174,6 +174,14 @@ class AxisDriveOf {
   /// commanded velocity drops to zero at once.
   Cycle hold();
 
+  /// Whether what it does while its set-point stands depends on nothing but its own state and, at
+  /// the tool centre, on slow functions of time: then a drive that has come to rest stays so.
+  bool can_rest() const {
+    return !laws_ && !sampled_ && !reception_.some_active() && !shaping_.some_active();
+  }
+  /// A cycle at rest: nothing changes but the time.
+  void rest() { ++cycle_; }
+
   /// Commanded positions and velocities of all axes for the end of the coming cycle: what a law of
   /// this axis may know of the others. Call it before follow().
   void tell_commands(const AxisVector& position, const AxisVector& velocity);

@@ -8,6 +8,7 @@
 #include "diagnosis/report/diagnosis_figures.hpp"
 #include "diagnosis/report/diagnosis_json.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
+#include "diagnosis/search/freed_number.hpp"
 
 namespace vcnc {
 namespace {
