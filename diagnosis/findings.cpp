@@ -101,6 +101,7 @@ class Report {
     tell_effects();
     tell_clamping();
     tell_noise_lines();
+    tell_events();
     if (!selection_.interrupted) tell_law();
     tell_chatter();
     std::stable_sort(d_.effects.begin(), d_.effects.end(), [](const auto& a, const auto& b) {
@@ -492,6 +493,20 @@ class Report {
           : probe ? " (vibration between tool and piece)."
                   : "."));
     }
+  }
+
+  /// What an axis did in one lap and not in another.
+  void tell_events() {
+    std::map<std::size_t, std::string> times;
+    for (const LapEvent& e : evidence_.events())
+      times[e.axis] +=
+          fmt::format("{}{:.2f}", times.contains(e.axis) ? ", " : "",
+                      static_cast<double>(e.begin + e.end) / 2 * evidence_.record().period);
+    for (const auto& [axis, at] : times)
+      d_.notes.push_back(fmt::format(
+          "{} does not do the same in all laps about {} s, as an axis that stops in its friction "
+          "may; these moments were left out.",
+          kAxisNames[axis], at));
   }
 
   void flag_minor() {

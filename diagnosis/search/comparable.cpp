@@ -13,6 +13,8 @@ using Flags = std::vector<std::vector<char>>;
 /// An axis stands when its command moved less than this in each of the last and next 25 ms.
 constexpr double kStandingLinear = 0.2e-3, kStandingRotary = 0.2e-3;  // [m/s], [rad/s]
 constexpr double kReach = 0.025;                                      // [s]
+/// So long after its last motion nothing but the rounding of its encoder says where it rests.
+constexpr double kSettled = 0.5;  // [s]
 /// Readings are rough where their second differences in that reach are as large, of the usual.
 constexpr double kRough = 8;
 constexpr double kSlowSliding = 20e-3;  // [m/s]
@@ -35,6 +37,25 @@ void mask_standing(const Record& record, const std::vector<ComparedChannel>& cha
       const std::size_t before = k > reach ? k - reach : 0;
       const std::size_t after = std::min(q.size() - 1, k + reach);
       if (std::abs(q[k] - q[before]) < slow || std::abs(q[after] - q[k]) < slow) valid[c][k] = 0;
+    }
+  }
+}
+
+void mask_settled(const Record& record, const std::vector<ComparedChannel>& channels,
+                  Flags& valid) {
+  const auto settled = static_cast<std::size_t>(std::round(kSettled / record.period));
+  for (std::size_t c = 0; c < valid.size(); ++c) {
+    const ComparedChannel& channel = channels[c];
+    if (channel.kind != SignalKind::position) continue;
+    const MeasuredSignal* command = record.find(SignalKind::command, channel.axis);
+    if (!command) continue;
+    const double slow =
+        (is_rotary(channel.axis) ? kStandingRotary : kStandingLinear) * record.period;
+    const std::vector<double>& q = command->value;
+    std::size_t still = settled;  // samples since it moved; before the record it stood
+    for (std::size_t k = 1; k < q.size(); ++k) {
+      still = std::abs(q[k] - q[k - 1]) < slow ? still + 1 : 0;
+      if (still > settled) valid[c][k] = 0;
     }
   }
 }
@@ -121,6 +142,7 @@ std::vector<std::vector<char>> comparable_samples(const Record& record,
       flags[k] = std::isfinite(measured[c][k]) && std::isfinite(declared[c][k]);
   }
   mask_standing(record, channels, valid);
+  mask_settled(record, channels, valid);
   mask_touching(record, channels, declared, valid);
   mask_turning_drag(record, channels, measured, declared, valid);
   return valid;

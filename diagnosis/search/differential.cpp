@@ -76,23 +76,38 @@ Record without_outliers(Record record, const Replica& replica, const Machine& de
   return record;
 }
 
-/// The declared machine with the piece where it was clamped for a run; what vibrates in it.
-std::pair<Machine, std::vector<NoiseLine>> as_clamped(const Record& run, Replica& replica,
-                                                      const Machine& declared) {
+/// The declared machine with the piece where it was clamped for a run; what vibrates in it, and
+/// what was not the same in all laps.
+struct Clamped {
+  Machine machine;
+  std::vector<NoiseLine> lines;
+  std::vector<LapEvent> events;
+};
+
+Clamped as_clamped(const Record& run, Replica& replica, const Machine& declared) {
   const Record record = without_outliers(run, replica, declared);
   Evidence evidence(record, replica, declared);
   std::vector<FreedNumber> clamping = nuisances(declared);
   std::erase_if(clamping,
                 [](const FreedNumber& n) { return !n.number.key.starts_with("effects.setup."); });
-  return {fit_numbers(evidence, declared, std::move(clamping)).machine, evidence.noise().lines};
+  return {fit_numbers(evidence, declared, std::move(clamping)).machine, evidence.noise().lines,
+          evidence.events()};
+}
+
+/// Whether a sample of a signal is left out for what laps did not share.
+bool unlike(const std::vector<LapEvent>& events, const MeasuredSignal& signal, std::size_t sample) {
+  return std::any_of(events.begin(), events.end(), [&](const LapEvent& e) {
+    return e.begin <= sample && sample < e.end &&
+           (signal.kind == SignalKind::deflection || signal.axis == e.axis);
+  });
 }
 
 }  // namespace
 
 DifferentialRecord less_healthy(const Record& now, const Record& healthy, Replica& of_healthy,
                                 const Machine& declared) {
-  DifferentialRecord result{.record = now, .lines = {}, .healthy = {}};
-  std::tie(result.healthy, result.lines) = as_clamped(healthy, of_healthy, declared);
+  const Clamped clamped = as_clamped(healthy, of_healthy, declared);
+  DifferentialRecord result{.record = now, .lines = clamped.lines, .healthy = clamped.machine};
   const Prediction predicted = of_healthy.predict(result.healthy);
   const std::vector<ComparedChannel>& channels = of_healthy.channels();
   std::size_t fewest = 0, unmatched = 0;
@@ -119,7 +134,7 @@ DifferentialRecord less_healthy(const Record& now, const Record& healthy, Replic
           double sum = 0;
           for (const Stretch* h : laps) {
             const std::size_t at = std::min(h->begin + (k - s.begin), h->end - 1);
-            sum += partner->value[at] - yhat[at];
+            sum += unlike(clamped.events, signal, at) ? kMissing : partner->value[at] - yhat[at];
           }
           left[k] = signal.value[k] - sum / static_cast<double>(laps.size());
         }

@@ -75,11 +75,25 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
     either.insert(either.end(), per_shift.begin(), per_shift.end());
     take_out_shifts(laps, either, difference);
   }
+  events_ = lap_events(partition_, record.period, replica.channels(), difference);
+  leave_out(events_);
+  mask(difference);
+  mask(rounding);
   noise_ = audit_noise(record, partition_, replica.channels(), difference, rounding);
   for (ChannelNoise& channel : noise_.channels) channel.filter.scale *= noise_scale;
   count_valid();
   if (!rounding.empty() && !per_shift.empty())
     whiten_shifts(per_shift, rms_shift(laps, per_shift, rounding));
+}
+
+void Evidence::leave_out(const std::vector<LapEvent>& events) {
+  for (const LapEvent& e : events)
+    for (std::size_t c = 0; c < raw_valid_.size(); ++c) {
+      const ComparedChannel& channel = replica_.channels()[c];
+      if (channel.kind == SignalKind::deflection || channel.axis == e.axis)
+        std::fill(raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(e.begin),
+                  raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(e.end), 0);
+    }
 }
 
 void Evidence::count_valid() {

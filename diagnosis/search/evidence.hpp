@@ -8,7 +8,8 @@
 // Shifts of the piece from lap to lap, as large as the rounding of encoders makes them, are
 // whitened in addition (lap_shifts.hpp).
 //
-// Only samples that can be compared count (comparable.hpp), and none outside every stretch.
+// Only samples that can be compared count (comparable.hpp), none outside every stretch, and not
+// what an axis does in one lap and not in another (lap_events.hpp).
 #pragma once
 
 #include <Eigen/Dense>
@@ -20,6 +21,7 @@
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
 #include "diagnosis/search/gathering.hpp"
+#include "diagnosis/search/lap_events.hpp"
 #include "diagnosis/search/lap_shifts.hpp"
 #include "diagnosis/search/noise_audit.hpp"
 #include "diagnosis/search/partition.hpp"
@@ -65,6 +67,8 @@ class Evidence {
   const Replica& replica() const { return replica_; }
   const Partition& partition() const { return partition_; }
   const NoiseAudit& noise() const { return noise_; }
+  /// What was left out for it: of the axis' own channels, and of the readings.
+  const std::vector<LapEvent>& events() const { return events_; }
 
   Prediction predict(const Machine& hypothesis) const;
   /// As many at a time as are worth it.
@@ -116,6 +120,7 @@ class Evidence {
   /// What these machines make of the readings of the probe, of what each is shifted by [m]; empty
   /// where there are none.
   std::vector<SeriesOfChannels> readings_per_shift(const std::vector<Machine>& shifted) const;
+  void leave_out(const std::vector<LapEvent>& events);
   void count_valid();
   void whiten_shifts(const std::vector<SeriesOfChannels>& per_shift, const Eigen::Vector3d& shift);
   /// Says nothing of samples that cannot be compared.
@@ -132,6 +137,7 @@ class Evidence {
   Prediction declared_;
   std::vector<std::vector<char>> raw_valid_, valid_;
   std::vector<double> fitted_count_, held_out_count_;  ///< of valid_, per channel
+  std::vector<LapEvent> events_;
   NoiseAudit noise_;
   ShiftWhitening of_shifts_;
 };

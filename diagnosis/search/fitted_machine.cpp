@@ -136,17 +136,28 @@ void linearise(const Evidence& evidence, FittedMachine& m, const std::vector<std
     m.nuisances.columns[which[i]] = std::move(columns[i]);
 }
 
+constexpr double kSettled = 5;  // chi-square that no further look is worth
+
+/// Fits where the replica is exact: what is found there may be where it is not any more.
+void converge_exactly(Evidence& evidence, FittedMachine& m) {
+  constexpr int kAnchors = 4;
+  for (int i = 0; i < kAnchors; ++i) {
+    converge(evidence, m);
+    const double there = m.held_out;
+    anchor_at(evidence, m);
+    if (std::abs(there - m.held_out) < kSettled) break;
+  }
+}
+
 /// Takes sensitivities of `which` where the machine stands and fits, until that changes nothing, or
 /// would, if gains go on to shrink as they do; `gain` is that of the fit before.
-void fit_in_rounds(const Evidence& evidence, FittedMachine& m,
-                   const std::vector<std::size_t>& which,
+void fit_in_rounds(Evidence& evidence, FittedMachine& m, const std::vector<std::size_t>& which,
                    double gain = std::numeric_limits<double>::infinity()) {
   constexpr int kLinearisations = 3;
-  constexpr double kSettled = 5;  // chi-square that no further one is worth
   for (int round = 0; round < kLinearisations; ++round) {
     const double before = m.held_out, last = gain;
     linearise(evidence, m, which);
-    converge(evidence, m);
+    converge_exactly(evidence, m);
     gain = before - m.held_out;
     const double next = last > 0 && std::isfinite(last) ? gain * gain / last : gain;
     if (gain < kSettled || next < kSettled) break;
@@ -204,6 +215,13 @@ void converge(const Evidence& evidence, FittedMachine& m) {
   }
 }
 
+void anchor_at(Evidence& evidence, FittedMachine& m) {
+  evidence.anchor(m.machine);
+  m.prediction = evidence.predict(m.machine);
+  m.residual = evidence.residual(m.prediction);
+  m.held_out = Ground(evidence, m.residual, m.linear()).held_out;
+}
+
 FittedMachine fit_declared(Evidence& evidence, const Machine& declared) {
   return fit_numbers(evidence, declared, nuisances(declared));
 }
@@ -224,15 +242,15 @@ FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
   }
   m.nuisances = std::move(shown);
   converge(evidence, m);
+  anchor_at(evidence, m);
   const double before = m.held_out;
-  evidence.anchor(m.machine);
-  converge(evidence, m);
+  converge_exactly(evidence, m);
   fit_in_rounds(evidence, m, every(m), before - m.held_out);
   return m;
 }
 
 void settle_in(Evidence& evidence, FittedMachine& m) {
-  evidence.anchor(m.machine);
+  anchor_at(evidence, m);
   fit_in_rounds(evidence, m, concerned(m));
   const bool far =
       std::any_of(m.nuisances.numbers.begin(), m.nuisances.numbers.end(),
@@ -245,9 +263,11 @@ void settle_in(Evidence& evidence, FittedMachine& m) {
     evidence.anchor(anew.machine);
     stay(evidence, anew);
     fit_in_rounds(evidence, anew, every(anew));
-    if (anew.held_out < m.held_out + kNoStep) m = std::move(anew);
+    if (anew.held_out < m.held_out + kNoStep)
+      m = std::move(anew);
+    else
+      evidence.anchor(m.machine);
   }
-  evidence.anchor(m.machine);
 }
 
 }  // namespace vcnc

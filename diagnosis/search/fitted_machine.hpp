@@ -40,6 +40,9 @@ struct FittedMachine {
 /// Fits all numbers of a machine together, nuisances included, until nothing moves.
 void converge(const Evidence& evidence, FittedMachine& machine);
 
+/// Makes the replica exact at the machine and computes anew what it leaves.
+void anchor_at(Evidence& evidence, FittedMachine& machine);
+
 /// After an effect was added: takes the sensitivities of the declared numbers where the machine now
 /// stands and fits all together. Where the effect had been missing, some may have been pulled far;
 /// then fits again from the declarations, too, and keeps what is better.

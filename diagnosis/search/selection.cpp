@@ -123,6 +123,7 @@ class Search {
           i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
       drop(trial);
       hold_again(trial);
+      anchor_at(evidence_, trial);
       if (now.held_out - trial.held_out > contenders[i].needed) {
         now = std::move(trial);
         return true;

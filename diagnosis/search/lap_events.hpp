@@ -1,0 +1,31 @@
+// What an axis does in one lap and not in another.
+//
+// An axis that stops in its friction stays where it is, or breaks away once more, and the rounding
+// of its encoder decides which. No model can tell, so that such a moment is neither compared nor
+// counted as noise of the laps: it is where position, twist or force of an axis differ between the
+// laps of a condition by 40 times what they do elsewhere, until it has faded to 4 times. If that is
+// more than a fiftieth of the laps, it is no event but what the laps are like.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "diagnosis/replica/replica.hpp"
+#include "diagnosis/search/partition.hpp"
+
+namespace vcnc {
+
+struct LapEvent {
+  std::size_t axis = 0;
+  std::size_t begin = 0, end = 0;  ///< samples [begin, end) of one lap
+
+  bool operator==(const LapEvent&) const = default;
+};
+
+/// Of every lap of the condition that has one, with 50 ms before and after, in the order of axes
+/// and time; `difference`: measured less predicted, NaN where that is not compared.
+std::vector<LapEvent> lap_events(const Partition& partition, double period,
+                                 const std::vector<ComparedChannel>& channels,
+                                 const SeriesOfChannels& difference);
+
+}  // namespace vcnc
