@@ -49,6 +49,12 @@ double misfit(const Evidence& evidence, const Column& residual, const std::vecto
   return sum;
 }
 
+/// The same where it stands, all channels alike.
+double misfit(const Evidence& evidence, const FittedMachine& m) {
+  const std::vector<double> alike(m.residual.size(), 1.0);
+  return misfit(evidence, m.residual, alike, m.nuisances.numbers);
+}
+
 /// Part of the way from `from` to `to`.
 std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vector<FreedNumber> to,
                                  double share) {
@@ -143,9 +149,9 @@ void converge_exactly(Evidence& evidence, FittedMachine& m) {
   constexpr int kAnchors = 4;
   for (int i = 0; i < kAnchors; ++i) {
     converge(evidence, m);
-    const double there = m.held_out;
+    const double there = misfit(evidence, m);
     anchor_at(evidence, m);
-    if (std::abs(there - m.held_out) < kSettled) break;
+    if (std::abs(there - misfit(evidence, m)) < kSettled) break;
   }
 }
 
@@ -263,7 +269,7 @@ void settle_in(Evidence& evidence, FittedMachine& m) {
     evidence.anchor(anew.machine);
     stay(evidence, anew);
     fit_in_rounds(evidence, anew, every(anew));
-    if (anew.held_out < m.held_out + kNoStep)
+    if (misfit(evidence, anew) < misfit(evidence, m))
       m = std::move(anew);
     else
       evidence.anchor(m.machine);

@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kClearLoss = 4;          ///< times the least gain: no need to look closer
 constexpr std::size_t kAttempts = 3;      ///< contenders that are fitted together with all else
+constexpr double kAsGood = 0.99;          ///< part of a gain that is as much before all is fitted
 constexpr std::size_t kAlternatives = 1;  ///< other beginnings
 constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to look for another one
 constexpr std::size_t kImitation = 3;  ///< names that are too many where one law does better
@@ -118,19 +119,46 @@ class Search {
   bool accept_one(FittedMachine& now, const std::vector<Contender>& contenders,
                   const Contest& contest) {
     for (std::size_t i = 0; i < std::min(kAttempts, contenders.size()) && going_; ++i) {
-      FittedMachine trial = now;
-      add(trial, contenders[i],
-          i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
-      drop(trial);
-      hold_again(trial);
-      anchor_at(evidence_, trial);
+      FittedMachine trial =
+          fitted_with(now, contenders[i],
+                      i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
       if (now.held_out - trial.held_out > contenders[i].needed) {
+        if (const Contender* other = of_other_kind(contenders, i)) {
+          FittedMachine instead = fitted_with(now, *other, {});
+          if (instead.held_out < trial.held_out)
+            trial = std::move(instead);
+          else
+            evidence_.anchor(trial.machine);
+        }
         now = std::move(trial);
         return true;
       }
       evidence_.anchor(now.machine);
     }
     return false;
+  }
+
+  /// With a contender, everything fitted together.
+  FittedMachine fitted_with(const FittedMachine& now, const Contender& contender,
+                            const std::vector<std::size_t>& equivalent) {
+    FittedMachine m = now;
+    add(m, contender, equivalent);
+    drop(m);
+    hold_again(m);
+    anchor_at(evidence_, m);
+    return m;
+  }
+
+  /// An effect that does as well as a declared number out of tolerance, or the other way round:
+  /// what each asks of the other declared numbers shows when all are fitted only.
+  static const Contender* of_other_kind(const std::vector<Contender>& contenders,
+                                        std::size_t than) {
+    const Contender& best = contenders[than];
+    for (std::size_t i = than + 1; i < contenders.size(); ++i)
+      if (contenders[i].released.empty() != best.released.empty() &&
+          contenders[i].gain > kAsGood * best.gain)
+        return &contenders[i];
+    return nullptr;
   }
 
   /// What the first effect must reach.

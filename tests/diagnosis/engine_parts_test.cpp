@@ -397,6 +397,65 @@ TEST(Intervals, KnowThatALawIsKnownToTwoPercentOnly) {
   EXPECT_NEAR(inexact, 1.96 * 0.02 * 5, 0.05);
 }
 
+TEST(Intervals, WhatALawGetsWrongAboutOneAmplitudeShowsInTheOthers) {
+  Record record = toy::commands(400, 4);
+  Machine truth;
+  toy::measure(record, truth, 3);
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, Machine());
+  FittedMachine m = fit_declared(evidence, Machine());
+  // Numbers that the toy knows, told as if of one effect: 50 urad beside 1 urad.
+  const FreedNumber large{.number = {"effects.geometry.squareness.xy_urad", 50, -5000, 5000},
+                          .value = 50};
+  FreedNumber small = large;
+  small.number.key = "effects.geometry.squareness.xz_urad";
+  small.value = 1;
+  m.added.push_back({.candidate = 5, .numbers = {large, small}, .gain = 0, .class_with = {}});
+  m.columns = columns_of(evidence, m.machine, m.prediction, m.numbers());
+  const auto intervals = intervals_of(evidence, m, true);
+  EXPECT_GT(intervals.at(small.number.key).half_width, 1.9 * 0.02 * 50);
+}
+
+/// Right where it was anchored; elsewhere only seven tenths of a change are seen.
+class Askew : public Replica {
+ public:
+  explicit Askew(const Record& commands) : toy_(commands) {}
+  const std::vector<ComparedChannel>& channels() const override { return toy_.channels(); }
+  Prediction predict(const Machine& m) const override {
+    Prediction there = toy_.predict(anchor_), here = toy_.predict(m), all;
+    for (std::size_t c = 0; c < here.size(); ++c) {
+      std::vector<double> seen = here[c];
+      for (std::size_t k = 0; k < seen.size(); ++k) seen[k] -= 0.3 * (here[c][k] - there[c][k]);
+      all.emplace_back(std::move(seen));
+    }
+    return all;
+  }
+  void anchor(const Machine& m) override { anchor_ = m; }
+
+ private:
+  toy::ToyReplica toy_;
+  Machine anchor_;
+};
+
+TEST(FittedMachine, IsJudgedWhereTheReplicaIsExact) {
+  Record record = toy::commands(400, 4);
+  Machine truth;
+  move_number(truth, "axes.X.load_kg", 515);
+  toy::measure(record, truth, 3);
+  const std::string key = "axes.X.load_kg";
+  const auto fitted = [&](Replica& replica) {
+    Evidence evidence(record, replica, Machine());
+    const FittedMachine m = fit_declared(evidence, Machine());
+    const Column exact = evidence.residual(toy::ToyReplica(record).predict(m.machine));
+    EXPECT_NEAR(evidence.chi2(m.residual, Role::held_out), evidence.chi2(exact, Role::held_out),
+                1e-6);
+    return number_of(m.machine, key);
+  };
+  toy::ToyReplica straight(record);
+  Askew askew(record);
+  EXPECT_NEAR(fitted(askew), fitted(straight), 0.02);
+}
+
 TEST(Intervals, CoverTheTruthAsOftenAsTheySay) {
   const std::vector<Candidate> all = toy::candidates();
   int inside = 0, numbers = 0;
