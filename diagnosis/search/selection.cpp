@@ -125,7 +125,11 @@ class Search {
       if (now.held_out - trial.held_out > contenders[i].needed) {
         if (const Contender* other = of_other_kind(contenders, i)) {
           FittedMachine instead = fitted_with(now, *other, {});
-          if (instead.held_out < trial.held_out)
+          const auto numbers = [](const Contender& c) {
+            return static_cast<double>(c.numbers.size());
+          };
+          const double more = numbers(*other) - numbers(contenders[i]);
+          if (instead.held_out + more * options_.class_gain < trial.held_out)
             trial = std::move(instead);
           else
             evidence_.anchor(trial.machine);
