@@ -64,8 +64,9 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
     options.form_um = 1e6 * kChangeOfForm *
                       std::hypot(difference->off[0], difference->off[1], difference->off[2]);
   }
-  options.least_gain =
-      std::max(options.least_gain, kFormAllowance * evidence.count(Role::held_out));
+  const double allowance = kFormAllowance * evidence.count(Role::held_out);
+  options.least_gain = std::max(options.least_gain, allowance);
+  options.release_gain = std::max(options.release_gain, allowance);
   options.form = kForm * evidence.count(Role::held_out);
   options.share_of_form = kShareOfForm;
   options.share_of_found = kShareOfFound;

@@ -19,6 +19,8 @@ using namespace figure_style;
 constexpr int kBins = 30;
 /// Lower edge of a plot 300 high: with less room gnuplot leaves out what its axis is.
 constexpr double kUnder = 0.21;
+/// In the unit shown: less is nothing, and its numbers would have no room.
+constexpr double kNothingToSee = 1e-6;
 
 Envelope envelope_of(const std::vector<double>& value, double begin, double period) {
   Envelope e(begin, begin + static_cast<double>(value.size()) * period, 1200);
@@ -154,12 +156,12 @@ std::string residual_figure(const Record& record, const ModelResiduals& residual
     const Envelope after = envelope_of(residuals.after[c], record.begin, record.period);
     const std::string b = fmt::format("b{}", i), a = fmt::format("a{}", i);
     const double most = std::max(reach(before), reach(after)) * unit.factor;
+    const double shown = most > kNothingToSee ? 1.1 * most : 1;
     const double upper = top - static_cast<double>(i) * height;
     text += block(b, before, 1, unit.factor) + block(a, after, 1, unit.factor) +
             margins(upper - 0.8 * height, upper) +
-            fmt::format("set yrange [{0:.6g}:{1:.6g}]\nset ylabel '{2} [{3}]' offset 0.5\n",
-                        -1.1 * std::max(most, 1e-12), 1.1 * std::max(most, 1e-12),
-                        channel_name(residuals.channels[c]), unit.name);
+            fmt::format("set yrange [{0:.6g}:{1:.6g}]\nset ylabel '{2} [{3}]' offset 0.5\n", -shown,
+                        shown, channel_name(residuals.channels[c]), unit.name);
     text += i + 1 < channels.size() ? "set format x ''\nset xlabel ''\n"
                                     : "set format x '%g'\nset xlabel 'time  [s]'\n";
     text += "plot " + line(b.c_str(), i == 0 ? "before" : "", kOrange) + ", " +

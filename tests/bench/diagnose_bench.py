@@ -43,7 +43,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="vcnc-bench-") as folder:
         home = pathlib.Path(folder)
         program, ring = str(home / "laps.ngc"), ["--set", f"setup.piece={piece}"]
-        cost([vcnc, "program", "circle", "--machine", machine, *ring, "--feed-mm-min", "3000", "--laps", "3", "--out", program])
+        cost([vcnc, "program", "circle", "--machine", machine, *ring, "--feed-mm-min", "2700", "--laps", "3", "--out", program])
 
         def run(name, injected):
             inject = [word for key in [NOISE, *injected] for word in ("--inject", key)]

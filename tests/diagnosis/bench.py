@@ -270,13 +270,22 @@ def independent_part(vcnc, work, seed, counts, jobs, individuals, absolute=False
 
 def shuffled(work, s, rng):
     """The control: what the test differs from its reference, lap by lap, goes to laps of other conditions; lengths are
-    made equal by repetition. Whatever is found then is an error of the diagnosis."""
+    made equal by repetition. What an axis differs by while it stands is not compared where it comes from, so it does not
+    go where the axis moves. Whatever is found then is an error of the diagnosis."""
     laps = tomllib.loads((work / "map.toml").read_text())["laps"]
     with open(work / s["reference"], encoding="ascii") as file:
         head = file.readline()
     reference = np.loadtxt(work / s["reference"], delimiter=",", skiprows=1)
     test = np.loadtxt(work / f"test_{s['number']}.csv", delimiter=",", skiprows=1)
     rest, out = test - reference, reference.copy()
+    columns = head.strip().split(",")
+    for axis in machine.AXES:
+        command = next(i for i, c in enumerate(columns) if c.startswith(f"{axis}_command_"))
+        moves = np.abs(np.gradient(test[:, command])) > 1e-7
+        stands = np.convolve(moves, np.ones(51), "same") == 0
+        for i, c in enumerate(columns):
+            if c.startswith(f"{axis}_"):
+                rest[stands, i] = 0
     spans = [(round(l["from_s"] * 1000), round(l["to_s"] * 1000)) for l in laps]
     while True:
         order = rng.permutation(len(laps))
@@ -285,7 +294,7 @@ def shuffled(work, s, rng):
     for (begin, end), j in zip(spans, order):
         out[begin:end] += np.resize(rest[spans[j][0]:spans[j][1]], (end - begin, rest.shape[1]))
     out[:, 0] = test[:, 0]
-    for i, name in enumerate(head.strip().split(",")):
+    for i, name in enumerate(columns):
         if "_command_" in name:
             out[:, i] = test[:, i]
     name = work / f"shuffled_{s['number']}.csv"
