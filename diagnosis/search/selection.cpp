@@ -72,9 +72,11 @@ class Search {
   FittedMachine climbed(const std::vector<Contender>& contenders, const Contest& first,
                         std::vector<LadderStep>& ladder) {
     FittedMachine now = result_.base;
+    result_.trials = at_base_;
     evidence_.anchor(now.machine);
     if (!accept_one(now, contenders, first)) return now;
     while (going_) {
+      look_again(now);
       exchange(now);
       ladder.push_back(step_of(now, ladder.size()));
       if (now.added.size() + now.released.size() >= options_.max_effects) break;
@@ -123,17 +125,17 @@ class Search {
           fitted_with(now, contenders[i],
                       i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
       if (now.held_out - trial.held_out > contenders[i].needed) {
-        if (const Contender* other = of_other_kind(contenders, i)) {
+        std::size_t numbers = contenders[i].numbers.size();
+        const bool leaves = rules_.excess(trial.held_out) > options_.least_gain;
+        for (const Contender* other : as_good(contenders, i, leaves)) {
           FittedMachine instead = fitted_with(now, *other, {});
-          const auto numbers = [](const Contender& c) {
-            return static_cast<double>(c.numbers.size());
-          };
-          const double more = numbers(*other) - numbers(contenders[i]);
-          if (instead.held_out + more * options_.class_gain < trial.held_out)
-            trial = std::move(instead);
-          else
-            evidence_.anchor(trial.machine);
+          const double more =
+              static_cast<double>(other->numbers.size()) - static_cast<double>(numbers);
+          if (instead.held_out + more * options_.class_gain > trial.held_out) continue;
+          trial = std::move(instead);
+          numbers = other->numbers.size();
         }
+        evidence_.anchor(trial.machine);
         now = std::move(trial);
         return true;
       }
@@ -153,16 +155,18 @@ class Search {
     return m;
   }
 
-  /// An effect that does as well as a declared number out of tolerance, or the other way round:
-  /// what each asks of the other declared numbers shows when all are fitted only.
-  static const Contender* of_other_kind(const std::vector<Contender>& contenders,
-                                        std::size_t than) {
+  /// Those after a contender that did as well: an effect instead of a declared number out of
+  /// tolerance, or the other way round, and any at all where the contender `leaves` something. What
+  /// each asks of all other numbers shows when these are fitted, too.
+  static std::vector<const Contender*> as_good(const std::vector<Contender>& contenders,
+                                               std::size_t than, bool leaves) {
     const Contender& best = contenders[than];
-    for (std::size_t i = than + 1; i < contenders.size(); ++i)
-      if (contenders[i].released.empty() != best.released.empty() &&
-          contenders[i].gain > kAsGood * best.gain)
-        return &contenders[i];
-    return nullptr;
+    std::vector<const Contender*> all;
+    for (std::size_t i = than + 1; i < contenders.size() && all.size() < kAttempts; ++i)
+      if (contenders[i].gain > kAsGood * best.gain &&
+          (leaves || contenders[i].released.empty() != best.released.empty()))
+        all.push_back(&contenders[i]);
+    return all;
   }
 
   /// What the first effect must reach.
@@ -191,8 +195,43 @@ class Search {
                                      candidates_, all, [&](double s) { return go(doing, s); });
     const Ground ground(evidence_, result_.base.residual, result_.base.nuisances);
     find_detection_limits(evidence_, ground, needed(), result_.trials);
+    at_base_ = result_.trials;
     result_.release_limits = release_limits(ground, result_.base.nuisances.numbers,
                                             options_.out_of_tolerance, options_.release_gain);
+  }
+
+  static bool of_drive(const Candidate& c) {
+    return c.family == Family::servo || c.family == Family::friction ||
+           c.family == Family::mechanics;
+  }
+
+  /// What an effect of a drive does depends on the others that it has (play rattles where nothing
+  /// rubs): of axes at whose drive something was found, trials are simulated anew with that.
+  void look_again(const FittedMachine& now) {
+    result_.trials = at_base_;
+    std::set<std::string> places;
+    std::set<std::size_t> known;
+    for (const AddedEffect& a : now.added) {
+      known.insert(a.candidate);
+      if (of_drive(candidates_[a.candidate])) places.insert(candidates_[a.candidate].place);
+    }
+    std::vector<std::size_t> which;
+    std::vector<Trial> again;
+    for (std::size_t t = 0; t < result_.trials.size(); ++t) {
+      const Trial& trial = result_.trials[t].trial;
+      const Candidate& c = candidates_[trial.candidate];
+      if (!of_drive(c) || !places.contains(c.place) || known.contains(trial.candidate)) continue;
+      which.push_back(t);
+      again.push_back(trial);
+    }
+    if (again.empty()) return;
+    std::vector<TrialColumns> anew =
+        simulate_trials(evidence_, now.machine, now.prediction, candidates_, std::move(again),
+                        [&](double s) { return go("simulating drives anew", s); });
+    for (std::size_t i = 0; i < which.size(); ++i) {
+      anew[i].detection_limit = result_.trials[which[i]].detection_limit;
+      result_.trials[which[i]] = std::move(anew[i]);
+    }
   }
 
   /// A drive whose axis never moves shows nothing of its servo, friction or mechanics; of one that
@@ -200,9 +239,7 @@ class Search {
   bool asleep(const Candidate& c) const {
     const auto name = std::find(kAxisNames.begin(), kAxisNames.end(), c.place);
     if (name == kAxisNames.end()) return false;
-    const Family family = c.family;
-    if (family != Family::servo && family != Family::friction && family != Family::mechanics)
-      return false;
+    if (!of_drive(c)) return false;
     const auto axis = static_cast<std::size_t>(name - kAxisNames.begin());
     if (std::count(options_.vibrating.begin(), options_.vibrating.end(), axis) > 0) return true;
     const MeasuredSignal* command = evidence_.record().find(SignalKind::command, axis);
@@ -354,6 +391,7 @@ class Search {
   const DiagnosisOptions& options_;
   const KeepGoing& keep_going_;
   SelectionResult result_;
+  std::vector<TrialColumns> at_base_;  ///< the trials of the base machine
   ContestRules rules_{
       evidence_, candidates_,
       options_,  result_.trials,
