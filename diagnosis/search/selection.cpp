@@ -129,8 +129,8 @@ class Search {
         const bool leaves = rules_.excess(trial.held_out) > options_.least_gain;
         for (const Contender* other : as_good(contenders, i, leaves)) {
           FittedMachine instead = fitted_with(now, *other, {});
-          const double more =
-              static_cast<double>(other->numbers.size()) - static_cast<double>(numbers);
+          const double more = std::max(
+              1.0, 1.0 + static_cast<double>(other->numbers.size()) - static_cast<double>(numbers));
           if (instead.held_out + more * options_.class_gain > trial.held_out) continue;
           trial = std::move(instead);
           numbers = other->numbers.size();
