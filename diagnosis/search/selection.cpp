@@ -19,7 +19,7 @@ constexpr double kAsGood = 0.99;          ///< part of a gain that is as much be
 constexpr std::size_t kAlternatives = 1;  ///< other beginnings
 constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to look for another one
 constexpr std::size_t kImitation = 3;  ///< names that are too many where one law does better
-constexpr double kHalf = 0.5;          ///< of what is left, see DiagnosisOptions::few_effects
+constexpr double kHalf = 0.5;  ///< of what is left: for a further effect than few, or another one
 constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
 
 class Search {
@@ -131,7 +131,10 @@ class Search {
           FittedMachine instead = fitted_with(now, *other, {});
           const double more = std::max(
               1.0, 1.0 + static_cast<double>(other->numbers.size()) - static_cast<double>(numbers));
-          if (instead.held_out + more * options_.class_gain > trial.held_out) continue;
+          const bool of_one_kind = other->released.empty() == contenders[i].released.empty();
+          const double clearly = std::max(more * options_.class_gain,
+                                          of_one_kind ? kHalf * rules_.excess(trial.held_out) : 0);
+          if (instead.held_out + clearly > trial.held_out) continue;
           trial = std::move(instead);
           numbers = other->numbers.size();
         }
