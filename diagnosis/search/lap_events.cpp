@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <limits>
 #include <tuple>
 
 namespace vcnc {
@@ -14,29 +14,20 @@ constexpr double kMost = 0.02;             // of all samples
 constexpr double kReach = 0.05;            // [s]
 constexpr int kClippings = 10;
 
-/// Laps of one condition, cut to the shortest, and how far the one that differs most from their
-/// mean is off it.
+/// Laps of one condition, and how far the one that differs most from their mean is off it.
 struct Repeated {
-  std::vector<std::size_t> begins;
+  std::vector<Stretch> laps;
   std::vector<double> off;
 };
 
 std::vector<Repeated> repeated(const Partition& partition, const std::vector<double>& series) {
-  std::map<int, std::vector<const Stretch*>> laps;
-  for (const Stretch& s : partition.stretches) laps[s.condition].push_back(&s);
   std::vector<Repeated> all;
-  for (const auto& [condition, of] : laps) {
-    if (of.size() < 2) continue;
-    std::size_t length = of.front()->end - of.front()->begin;
-    for (const Stretch* s : of) length = std::min(length, s->end - s->begin);
-    const double n = static_cast<double>(of.size());
-    Repeated& r = all.emplace_back();
-    for (const Stretch* s : of) r.begins.push_back(s->begin);
-    for (std::size_t k = 0; k < length; ++k) {
+  for (const std::vector<Stretch>& of : partition.repetitions()) {
+    Repeated& r = all.emplace_back(Repeated{of, {}});
+    for (std::size_t k = 0; k < of.front().end - of.front().begin; ++k) {
       double mean = 0, most = 0;
-      for (const std::size_t begin : r.begins) mean += series[begin + k] / n;
-      for (const std::size_t begin : r.begins)
-        most = std::max(most, std::abs(series[begin + k] - mean));
+      for (const Stretch& s : of) mean += series[s.begin + k] / static_cast<double>(of.size());
+      for (const Stretch& s : of) most = std::max(most, std::abs(series[s.begin + k] - mean));
       r.off.push_back(std::isnan(mean) ? kMissing : most);
     }
   }
@@ -95,8 +86,8 @@ std::vector<LapEvent> lap_events(const Partition& partition, double period,
       samples += r.off.size();
       for (const auto& [begin, end] : events(r.off, kEvent * rms, kFaded * rms, reach)) {
         within += end - begin;
-        for (const std::size_t lap : r.begins)
-          found.push_back({channels[c].axis, lap + begin, lap + end});
+        for (const Stretch& lap : r.laps)
+          found.push_back({channels[c].axis, lap.begin + begin, lap.begin + end});
       }
     }
     if (static_cast<double>(within) > kMost * static_cast<double>(samples)) continue;

@@ -18,8 +18,6 @@ namespace vcnc {
 struct LapEvent {
   std::size_t axis = 0;
   std::size_t begin = 0, end = 0;  ///< samples [begin, end) of one lap
-
-  bool operator==(const LapEvent&) const = default;
 };
 
 /// Of every lap of the condition that has one, with 50 ms before and after, in the order of axes

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numeric>
 #include <unsupported/Eigen/FFT>
 
@@ -51,21 +50,17 @@ struct LapNoise {
 
 /// d_i of every lap of every condition that was repeated.
 std::vector<LapNoise> lap_noise(const Partition& partition, const Series& residual) {
-  std::map<int, std::vector<const Stretch*>> laps;
-  for (const Stretch& s : partition.stretches) laps[s.condition].push_back(&s);
   std::vector<LapNoise> all;
-  for (const auto& [condition, of] : laps) {
-    if (of.size() < 2) continue;
-    std::size_t length = of.front()->end - of.front()->begin;
-    for (const Stretch* s : of) length = std::min(length, s->end - s->begin);
+  for (const std::vector<Stretch>& of : partition.repetitions()) {
+    const std::size_t length = of.front().end - of.front().begin;
     const double n = static_cast<double>(of.size());
     Series mean(length, 0.0);
-    for (const Stretch* s : of)
-      for (std::size_t k = 0; k < length; ++k) mean[k] += residual[s->begin + k] / n;
+    for (const Stretch& s : of)
+      for (std::size_t k = 0; k < length; ++k) mean[k] += residual[s.begin + k] / n;
     for (std::size_t i = 0; i < of.size(); ++i) {
       LapNoise lap{Series(length), i % 2 == 1};
       for (std::size_t k = 0; k < length; ++k)
-        lap.value[k] = (residual[of[i]->begin + k] - mean[k]) * std::sqrt(n / (n - 1));
+        lap.value[k] = (residual[of[i].begin + k] - mean[k]) * std::sqrt(n / (n - 1));
       remove_line(lap.value);
       all.push_back(std::move(lap));
     }

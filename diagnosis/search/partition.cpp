@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <utility>
 
 namespace vcnc {
 namespace {
@@ -22,6 +23,20 @@ std::vector<Stretch> even_stretches(std::size_t samples) {
 }
 
 }  // namespace
+
+std::vector<std::vector<Stretch>> Partition::repetitions() const {
+  std::map<int, std::vector<Stretch>> laps;
+  for (const Stretch& s : stretches) laps[s.condition].push_back(s);
+  std::vector<std::vector<Stretch>> all;
+  for (auto& [condition, of] : laps) {
+    if (of.size() < 2) continue;
+    std::size_t length = of.front().end - of.front().begin;
+    for (const Stretch& s : of) length = std::min(length, s.end - s.begin);
+    for (Stretch& s : of) s.end = s.begin + length;
+    all.push_back(std::move(of));
+  }
+  return all;
+}
 
 std::size_t Partition::conditions() const {
   std::set<int> all;

@@ -27,6 +27,8 @@ struct Partition {
   bool repeated = false;           ///< some condition was run more than once
 
   std::size_t conditions() const;
+  /// The laps of every condition that was run more than once, all as long as its shortest.
+  std::vector<std::vector<Stretch>> repetitions() const;
 };
 
 Partition partition(const Record& record);

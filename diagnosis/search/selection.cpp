@@ -125,26 +125,33 @@ class Search {
           fitted_with(now, contenders[i],
                       i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
       if (now.held_out - trial.held_out > contenders[i].needed) {
-        std::size_t numbers = contenders[i].numbers.size();
-        const bool leaves = rules_.excess(trial.held_out) > options_.least_gain;
-        for (const Contender* other : as_good(contenders, i, leaves)) {
-          FittedMachine instead = fitted_with(now, *other, {});
-          const double more = std::max(
-              1.0, 1.0 + static_cast<double>(other->numbers.size()) - static_cast<double>(numbers));
-          const bool of_one_kind = other->released.empty() == contenders[i].released.empty();
-          const double clearly = std::max(more * options_.class_gain,
-                                          of_one_kind ? kHalf * rules_.excess(trial.held_out) : 0);
-          if (instead.held_out + clearly > trial.held_out) continue;
-          trial = std::move(instead);
-          numbers = other->numbers.size();
-        }
-        evidence_.anchor(trial.machine);
-        now = std::move(trial);
+        now = best_of_as_good(now, std::move(trial), contenders, i);
         return true;
       }
       evidence_.anchor(now.machine);
     }
     return false;
+  }
+
+  /// `trial`, which has the contender `than`, or one of those that did as well, if it clearly does
+  /// better when all is fitted.
+  FittedMachine best_of_as_good(const FittedMachine& now, FittedMachine trial,
+                                const std::vector<Contender>& contenders, std::size_t than) {
+    std::size_t numbers = contenders[than].numbers.size();
+    const bool leaves = rules_.excess(trial.held_out) > options_.least_gain;
+    for (const Contender* other : as_good(contenders, than, leaves)) {
+      FittedMachine instead = fitted_with(now, *other, {});
+      const double more = std::max(
+          1.0, 1.0 + static_cast<double>(other->numbers.size()) - static_cast<double>(numbers));
+      const bool of_one_kind = other->released.empty() == contenders[than].released.empty();
+      const double clearly = std::max(more * options_.class_gain,
+                                      of_one_kind ? kHalf * rules_.excess(trial.held_out) : 0);
+      if (instead.held_out + clearly > trial.held_out) continue;
+      trial = std::move(instead);
+      numbers = other->numbers.size();
+    }
+    evidence_.anchor(trial.machine);
+    return trial;
   }
 
   /// With a contender, everything fitted together.
