@@ -22,7 +22,7 @@ FittedMachine with_effects(const DiagnosisCase& of, const FittedMachine& machine
     for (std::size_t c = 0; c < of.candidates.size(); ++c) {
       const Candidate& candidate = of.candidates[c];
       if (candidate.effect != effect || candidate.place != kAxisNames[axis]) continue;
-      AddedEffect added{.candidate = c, .numbers = {}, .gain = 0, .class_with = {}};
+      AddedEffect added{.candidate = c};
       for (std::size_t i = 0; i < candidate.numbers.size(); ++i) {
         const FreeNumber& n = candidate.numbers[i];
         const bool shape =

@@ -6,6 +6,7 @@
 
 #include "diagnosis/findings.hpp"
 #include "diagnosis/search/chatter_search.hpp"
+#include "diagnosis/search/common_numbers.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/period_slip_search.hpp"
 
@@ -64,9 +65,8 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
     options.form_um = 1e6 * kChangeOfForm *
                       std::hypot(difference->off[0], difference->off[1], difference->off[2]);
   }
-  const double allowance = kFormAllowance * evidence.count(Role::held_out);
-  options.least_gain = std::max(options.least_gain, allowance);
-  options.release_gain = std::max(options.release_gain, allowance);
+  options.least_gain =
+      std::max(options.least_gain, kFormAllowance * evidence.count(Role::held_out));
   options.form = kForm * evidence.count(Role::held_out);
   options.share_of_form = kShareOfForm;
   options.share_of_found = kShareOfFound;
@@ -85,8 +85,16 @@ Diagnosis diagnose(const DiagnosisCase& of, const DiagnosisOptions& options,
 
 Diagnosis diagnose(const DiagnosisCase& of, const DifferentialRecord& difference,
                    const DiagnosisOptions& options, const KeepGoing& keep_going) {
-  return explained({difference.record, of.replica, difference.healthy, of.candidates}, of.record,
-                   &difference, options, keep_going);
+  DiagnosisOptions with_common = options;
+  with_common.common = common_numbers(difference.healthy);
+  ReplicaOfChange replica(of.replica, difference.healthy, with_common.common);
+  // A change of such a number would be no change.
+  std::vector<Candidate> candidates = of.candidates;
+  std::erase_if(candidates, [&](const Candidate& c) {
+    return c.numbers.size() == 1 && has_key(with_common.common, c.numbers.front().key);
+  });
+  return explained({difference.record, replica, difference.healthy, std::move(candidates)},
+                   of.record, &difference, with_common, keep_going);
 }
 
 std::vector<SignalFigure> figures_of(const Record& record, Replica& replica,

@@ -527,13 +527,15 @@ class Report {
     const bool anything = !found().added.empty() || !found().released.empty();
     LawFit law;
     if (!quiet)
-      law = best_law(evidence_, found(),
-                     doubt_of(options_, anything ? base : std::vector<double>{}, now), options_);
+      law = best_law(
+          evidence_, found(),
+          anything ? doubt_of(options_, found().explained(), base, now) : doubt_of(options_),
+          options_);
     // A law that does better than all that was named takes the names away.
     if (anything) {
-      LawFit instead = selection_.law_alone ? *selection_.law_alone
-                                            : best_law(evidence_, selection_.base,
-                                                       doubt_of(options_, {}, base), options_);
+      LawFit instead = selection_.law_alone
+                           ? *selection_.law_alone
+                           : best_law(evidence_, selection_.base, doubt_of(options_), options_);
       const double named = selection_.base.held_out - found().held_out;
       const double clearly = needed + options_.share_of_found * named;
       if (instead.gain > (found().added.size() > 1 ? named : named + clearly) &&

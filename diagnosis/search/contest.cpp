@@ -79,8 +79,9 @@ Contest::Contest(const ContestRules& rules, const FittedMachine& now)
       now_(now),
       linear_(now.linear()),
       ground_(rules.evidence, now.residual, linear_),
-      doubt_(doubt_of(rules.options, now.added.empty() ? std::vector<double>{} : rules.base_of,
-                      ground_.held_out_of)) {}
+      doubt_(now.added.empty()
+                 ? doubt_of(rules.options)
+                 : doubt_of(rules.options, now.explained(), rules.base_of, ground_.held_out_of)) {}
 
 std::vector<Contender> Contest::contenders() {
   const std::vector<Screened> all_trials = screen(rules_.evidence, ground_, doubt_,
@@ -311,7 +312,7 @@ std::vector<Contender> Contest::releases() const {
   std::vector<Contender> all;
   for (std::size_t i = 0; i < now_.nuisances.numbers.size(); ++i) {
     const FreedNumber& n = now_.nuisances.numbers[i];
-    if (std::abs(n.pull()) < rules_.options.out_of_tolerance ||
+    if (n.common || std::abs(n.pull()) < rules_.options.out_of_tolerance ||
         n.number.key.starts_with("effects.setup."))
       continue;
     Eigen::VectorXd precision = ground_.precision;

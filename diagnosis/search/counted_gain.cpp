@@ -9,30 +9,32 @@ namespace {
 /// Times what a found law leaves where it explains most, for what it may leave elsewhere.
 constexpr double kElsewhere = 4;
 
-/// Part of what was found that a law of it may be wrong by: as much as is believed of any, or less
+/// Part of what an effect explains that it may be wrong by: as much as is believed of any, or less
 /// where it has been seen to be right.
-double wrong_by(double believed, const std::vector<double>& before,
-                const std::vector<double>& left) {
-  double most = 0, seen = believed;
-  for (std::size_t c = 0; c < left.size(); ++c)
-    if (const double explained = before[c] - left[c]; explained > most)
-      most = explained, seen = kElsewhere * left[c] / explained;
-  return std::min(believed, seen);
+double wrong_by(double believed, const Explained& explained, const std::vector<double>& left) {
+  const auto most = std::max_element(explained.begin(), explained.end());
+  if (most == explained.end() || *most <= 0) return believed;
+  const auto channel = static_cast<std::size_t>(most - explained.begin());
+  return std::min(believed, kElsewhere * left[channel] / *most);
 }
 
 }  // namespace
 
-Doubt doubt_of(const DiagnosisOptions& options, const std::vector<double>& before,
-               const std::vector<double>& left) {
-  const std::vector<double>& form = options.form_of_channel;
-  if (form.empty() && before.empty()) return {};
-  Doubt doubt(left.size(), 0.0);
-  const double wrong = before.empty() ? 0 : wrong_by(options.share_of_found, before, left);
-  for (std::size_t c = 0; c < left.size(); ++c) {
-    if (!before.empty())
-      doubt[c] += wrong * std::max(0.0, before[c] - left[c]) + std::max(0.0, left[c] - before[c]);
-    if (!form.empty()) doubt[c] += options.taken_of_form * form[c];
+Doubt doubt_of(const DiagnosisOptions& options) {
+  Doubt doubt = options.form_of_channel;
+  for (double& d : doubt) d *= options.taken_of_form;
+  return doubt;
+}
+
+Doubt doubt_of(const DiagnosisOptions& options, const std::vector<Explained>& found,
+               const std::vector<double>& before, const std::vector<double>& left) {
+  Doubt doubt = doubt_of(options);
+  doubt.resize(left.size(), 0.0);
+  for (const Explained& explained : found) {
+    const double wrong = wrong_by(options.share_of_found, explained, left);
+    for (std::size_t c = 0; c < left.size(); ++c) doubt[c] += wrong * std::max(0.0, explained[c]);
   }
+  for (std::size_t c = 0; c < left.size(); ++c) doubt[c] += std::max(0.0, left[c] - before[c]);
   return doubt;
 }
 

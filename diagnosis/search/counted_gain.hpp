@@ -2,9 +2,9 @@
 //
 // A model that gets the healthy machine wrong by some chi-square in a channel, or what it has
 // explained there, may gain a part of that by an effect that is not there. So of a gain in a
-// channel only that counts which exceeds such a part. A law that leaves next to nothing in the
-// channel where it explains most has been seen to be right, and is doubted less everywhere. What a
-// law brought into a channel where nothing was is no gain of the next one that takes it out again.
+// channel only that counts which exceeds such a part. An effect that leaves next to nothing in the
+// channel where it explains most has been seen to be right, and is doubted less everywhere. What
+// was brought into a channel where nothing was is no gain of the next one that takes it out again.
 #pragma once
 
 #include <vector>
@@ -16,10 +16,15 @@ namespace vcnc {
 /// Chi-square of the held-out laps per channel that does not count; empty: all counts.
 using Doubt = std::vector<double>;
 
-/// Where `left` is what is left now and `before` was there before anything was explained; nothing
-/// was explained yet where that is empty.
-Doubt doubt_of(const DiagnosisOptions& options, const std::vector<double>& before,
-               const std::vector<double>& left);
+/// Per channel: what of chi-square comes back without an effect.
+using Explained = std::vector<double>;
+
+/// Where `left` is what is left now and `before` was there before anything was explained, each of
+/// the found effects its part of it.
+Doubt doubt_of(const DiagnosisOptions& options, const std::vector<Explained>& found,
+               const std::vector<double>& before, const std::vector<double>& left);
+/// Where nothing was explained yet.
+Doubt doubt_of(const DiagnosisOptions& options);
 
 /// Of `gain`, which came from `before` going down to `after` in the channels.
 double counted(double gain, const std::vector<double>& before, const std::vector<double>& after,

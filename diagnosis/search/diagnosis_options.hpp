@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "diagnosis/search/freed_number.hpp"
+
 namespace vcnc {
 
 struct DiagnosisOptions {
@@ -31,6 +33,8 @@ struct DiagnosisOptions {
   double out_of_tolerance = 4.5;  ///< pull of a declared number
   double release_gain = 25;       ///< of one whose tolerance is lifted, priors included
   double clamped_um = 5;          ///< offset of the piece that is worth a word; 10 urad per um
+  /// Numbers that a healthy run has in common with the one that is explained.
+  std::vector<FreedNumber> common;
   /// Axes that vibrate by themselves: what else their drives do is not sought.
   std::vector<std::size_t> vibrating;
   std::size_t refits = 5, per_family = 2, pairs_of = 10;

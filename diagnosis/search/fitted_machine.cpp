@@ -110,18 +110,26 @@ std::string place_of(const std::string& key) {
   return key.substr(from, key.find('.', from) - from);
 }
 
-/// Declared numbers whose sensitivities are others than those of the declared machine: not those of
-/// a drive at which nothing was found.
-std::vector<std::size_t> concerned(const FittedMachine& m) {
+bool is_axis(const std::string& place) {
+  return std::find(kAxisNames.begin(), kAxisNames.end(), place) != kAxisNames.end();
+}
+
+/// Where something was found.
+std::set<std::string> places_found(const FittedMachine& m) {
   std::set<std::string> places;
   for (const FreedNumber& n : m.numbers()) places.insert(place_of(n.number.key));
   for (const std::string& key : m.released) places.insert(place_of(key));
+  return places;
+}
+
+/// Declared numbers whose sensitivities are others than those of the declared machine: not those of
+/// a drive at which nothing was found.
+std::vector<std::size_t> concerned(const FittedMachine& m) {
+  const std::set<std::string> places = places_found(m);
   std::vector<std::size_t> all;
   for (std::size_t i = 0; i < m.nuisances.numbers.size(); ++i) {
     const std::string place = place_of(m.nuisances.numbers[i].number.key);
-    const bool of_drive =
-        std::find(kAxisNames.begin(), kAxisNames.end(), place) != kAxisNames.end();
-    if (!of_drive || places.contains(place)) all.push_back(i);
+    if (!is_axis(place) || places.contains(place)) all.push_back(i);
   }
   return all;
 }
@@ -175,6 +183,12 @@ constexpr double kPulledFar = 1.5;
 
 }  // namespace
 
+std::vector<Explained> FittedMachine::explained() const {
+  std::vector<Explained> all;
+  for (const AddedEffect& a : added) all.push_back(a.explained);
+  return all;
+}
+
 std::vector<FreedNumber> FittedMachine::numbers() const {
   std::vector<FreedNumber> all;
   for (const AddedEffect& a : added) all.insert(all.end(), a.numbers.begin(), a.numbers.end());
@@ -219,6 +233,32 @@ void converge(const Evidence& evidence, FittedMachine& m) {
     if (std::abs(before - now) < 1 + 1e-4 * std::abs(now - evidence.count(Role::held_out))) break;
     before = now;
   }
+}
+
+void add_common(const Evidence& evidence, FittedMachine& m,
+                const std::vector<FreedNumber>& common) {
+  const std::set<std::string> places = places_found(m);
+  for (const FreedNumber& n : common) {
+    const std::string place = place_of(n.number.key);
+    if (has_key(m.nuisances.numbers, n.number.key) || (is_axis(place) && !places.contains(place)))
+      continue;
+    m.nuisances.numbers.push_back(n);
+    m.nuisances.columns.emplace_back(
+        Column::Channels(evidence.replica().channels().size()));  // until it is linearised
+  }
+}
+
+void hold_common(FittedMachine& m) {
+  const std::set<std::string> places = places_found(m);
+  std::vector<FreedNumber> held;
+  for (FreedNumber n : m.nuisances.numbers) {
+    const std::string place = place_of(n.number.key);
+    if (!n.common || places.contains(place) || (!is_axis(place) && !places.empty())) continue;
+    n.value = n.centre;
+    held.push_back(n);
+  }
+  m.machine = with(m.machine, held);
+  m.nuisances = without(m.nuisances, held);
 }
 
 void anchor_at(Evidence& evidence, FittedMachine& m) {

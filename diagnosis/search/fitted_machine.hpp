@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/search/counted_gain.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/refit.hpp"
 
@@ -14,9 +15,10 @@ namespace vcnc {
 /// An effect that was accepted.
 struct AddedEffect {
   std::size_t candidate = 0;  ///< index into the candidates
-  std::vector<FreedNumber> numbers;
+  std::vector<FreedNumber> numbers{};
   double gain = 0;
-  std::vector<std::size_t> class_with;  ///< candidates that do as well
+  Explained explained{};                  ///< held-out chi-square per channel, back without it
+  std::vector<std::size_t> class_with{};  ///< candidates that do as well
 };
 
 /// A machine by hypothesis with all that was computed at it.
@@ -31,6 +33,7 @@ struct FittedMachine {
   double held_out = std::numeric_limits<double>::infinity();
 
   std::vector<FreedNumber> numbers() const;  ///< of all added effects
+  std::vector<Explained> explained() const;  ///< by each of them
   /// Nuisances and added effects with their columns.
   LinearPart linear() const;
   /// With a declared number that was released held again as in `base`, nothing fitted.
@@ -39,6 +42,14 @@ struct FittedMachine {
 
 /// Fits all numbers of a machine together, nuisances included, until nothing moves.
 void converge(const Evidence& evidence, FittedMachine& machine);
+
+/// Frees those common numbers that make something of what was found: of the drives where that is,
+/// and of the probe.
+void add_common(const Evidence& evidence, FittedMachine& machine,
+                const std::vector<FreedNumber>& common);
+/// Holds those as declared again at whose drive nothing is any more; all of them where nothing is
+/// anywhere.
+void hold_common(FittedMachine& machine);
 
 /// Makes the replica exact at the machine and computes anew what it leaves.
 void anchor_at(Evidence& evidence, FittedMachine& machine);

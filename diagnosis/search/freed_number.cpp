@@ -22,6 +22,7 @@ constexpr Tolerance kTolerances[] = {
     {"effects.", ".viscous.coefficient", 0.05},
     {"effects.", ".presliding.stiffness", 0.10},
     {"effects.", ".windup.compliance", 0.02},
+    {"effects.", ".windup.damping_ratio", 0.50},
     {"effects.", ".backlash.gap", 0.02},
 };
 /// Tolerances in the unit of the key, of effects that are never quite absent.
@@ -91,6 +92,13 @@ void adopt(std::vector<FreedNumber>& numbers, const std::vector<FreedNumber>& fr
   for (FreedNumber& n : numbers)
     for (const FreedNumber& f : from)
       if (f.number.key == n.number.key) n.value = f.value;
+}
+
+void take_values(std::vector<FreedNumber>& numbers, const Machine& machine) {
+  Machine copy = machine;
+  for (const Parameter& p : parameters(copy))
+    for (FreedNumber& n : numbers)
+      if (n.number.key == p.key) n.value = p.in_unit();
 }
 
 bool has_key(const std::vector<FreedNumber>& numbers, const std::string& key) {

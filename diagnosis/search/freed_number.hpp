@@ -17,6 +17,7 @@ struct FreedNumber {
   double centre = 0;     ///< declared
   double tolerance = 0;  ///< standard deviation of the declaration; 0: nothing is known
   bool shape = false;    ///< frequency, time constant, ...: moved in small steps
+  bool common = false;   ///< the same in the healthy run (common_numbers.hpp)
 
   double pull() const { return tolerance > 0 ? (value - centre) / tolerance : 0; }
   /// Inverse variance of the declaration in units of the typical size.
@@ -32,6 +33,8 @@ void move_number(Machine& machine, const std::string& key, double value);
 Machine with(Machine machine, const std::vector<FreedNumber>& numbers);
 /// Gives numbers the values that those of the same keys have in `from`.
 void adopt(std::vector<FreedNumber>& numbers, const std::vector<FreedNumber>& from);
+/// Gives numbers the values that they have in a machine.
+void take_values(std::vector<FreedNumber>& numbers, const Machine& machine);
 bool has_key(const std::vector<FreedNumber>& numbers, const std::string& key);
 /// Unit of a key's number: "um" of "gap_um", "" where it has none.
 std::string unit_of_key(const std::string& key);
@@ -41,6 +44,7 @@ std::string unit_of_key(const std::string& key);
 ///   moving mass and inertia                    1 %
 ///   friction levels of declared effects        3 % dry, 5 % viscous, 10 % break-away, pre-sliding
 ///   compliance, play of declared effects       2 %
+///   damping of declared windup                 50 %
 ///   where the piece was clamped                free (100 um, 500 urad); reported above 5 um
 ///   scale of a linear axis                     1.5 ppm
 ///   size of gauge and ball                     1 um

@@ -22,6 +22,11 @@ constexpr std::size_t kImitation = 3;  ///< names that are too many where one la
 constexpr double kHalf = 0.5;  ///< of what is left: for a further effect than few, or another one
 constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
 
+Explained minus(Explained x, const std::vector<double>& y) {
+  for (std::size_t c = 0; c < x.size(); ++c) x[c] -= y[c];
+  return x;
+}
+
 class Search {
  public:
   Search(Evidence& evidence, const Machine& declared, const std::vector<Candidate>& candidates,
@@ -96,8 +101,7 @@ class Search {
     const double all = rules_.excess(result_.base.held_out);
     if (now.added.empty() || rules_.excess(now.held_out) < kMostLeft * all) return false;
     if (!result_.law_alone && go("looking for a law without a name", 0))
-      result_.law_alone =
-          best_law(evidence_, result_.base, doubt_of(options_, {}, rules_.base_of), options_);
+      result_.law_alone = best_law(evidence_, result_.base, doubt_of(options_), options_);
     if (!result_.law_alone) return false;
     const double gain = result_.law_alone->gain, named = result_.base.held_out - now.held_out;
     const bool many = now.added.size() >= kImitation;
@@ -181,8 +185,7 @@ class Search {
 
   /// What the first effect must reach.
   Needed needed() const {
-    Needed n{options_.least_gain, options_.form_of_channel, {}};
-    for (double& d : n.doubt) d *= options_.taken_of_form;
+    Needed n{options_.least_gain, doubt_of(options_), {}};
     n.consequence = {std::max(options_.least_contour_um, options_.form_um), 0,
                      options_.least_of_noise};
     return n;
@@ -263,6 +266,7 @@ class Search {
       for (FreedNumber& n : m.nuisances.numbers)
         if (n.number.key == best.released) n.tolerance = 0;
       m.released.push_back(best.released);
+      add_common(evidence_, m, options_.common);
       converge(evidence_, m);
       settle_in(evidence_, m);
       return;
@@ -273,8 +277,10 @@ class Search {
       for (std::size_t c = 0; c < candidates_.size(); ++c)
         for (const FreeNumber& own : candidates_[c].numbers)
           if (own.key == n.number.key) owners.insert(c);
+    const Explained explained =
+        minus(evidence_.chi2_of(m.residual, Role::held_out), best.fit.held_out_of);
     for (const std::size_t owner : owners) {
-      AddedEffect added{.candidate = owner, .numbers = {}, .gain = best.gain, .class_with = {}};
+      AddedEffect added{.candidate = owner, .gain = best.gain, .explained = explained};
       for (const FreedNumber& n : best.numbers)
         for (const FreeNumber& own : candidates_[owner].numbers)
           if (own.key == n.number.key) added.numbers.push_back(n);
@@ -288,6 +294,7 @@ class Search {
     adopt(m.nuisances.numbers, best.fit.linear);
     for (AddedEffect& a : m.added) adopt(a.numbers, best.fit.linear);
     evidence_.anchor(m.machine);
+    add_common(evidence_, m, options_.common);
     converge(evidence_, m);
     settle_in(evidence_, m);
   }
@@ -296,8 +303,7 @@ class Search {
   void drop(FittedMachine& m) {
     while (going_) {
       std::vector<double> loss(m.added.size());
-      for (std::size_t i = 0; i < m.added.size(); ++i)
-        m.added[i].gain = loss[i] = loss_without(m, i);
+      for (std::size_t i = 0; i < m.added.size(); ++i) loss[i] = weigh(m, i);
       if (m.added.empty()) return;
       const auto least =
           static_cast<std::size_t>(std::min_element(loss.begin(), loss.end()) - loss.begin());
@@ -323,10 +329,11 @@ class Search {
   }
 
   /// What one added effect is worth: without it, all others moved along their columns.
-  double loss_without(const FittedMachine& m, std::size_t i) const {
+  double weigh(FittedMachine& m, std::size_t i) const {
     const FittedMachine less = taken_out(m, i);
     const Ground ground(evidence_, less.residual, less.linear());
-    return ground.held_out - m.held_out;
+    m.added[i].explained = minus(ground.held_out_of, evidence_.chi2_of(m.residual, Role::held_out));
+    return m.added[i].gain = ground.held_out - m.held_out;
   }
 
   /// Without one of its effects, everything else as it was.
@@ -339,6 +346,7 @@ class Search {
     less.added.erase(less.added.begin() + static_cast<std::ptrdiff_t>(i));
     for (const FreeNumber& n : candidates_[m.added[i].candidate].numbers)
       move_number(less.machine, n.key, number_of(declared_, n.key));
+    hold_common(less);
     less.prediction = evidence_.predict(less.machine);
     less.residual = evidence_.residual(less.prediction);
     less.held_out = Ground(evidence_, less.residual, less.linear()).held_out;
@@ -382,6 +390,7 @@ class Search {
     less.added.erase(less.added.begin() + static_cast<std::ptrdiff_t>(i));
     for (const FreeNumber& n : candidates_[m.added[i].candidate].numbers)
       move_number(less.machine, n.key, number_of(declared_, n.key));
+    hold_common(less);
     converge(evidence_, less);
     return less;
   }

@@ -161,12 +161,13 @@ TEST(NoiseAudit, CountsWhatEncodersRoundOffThoughItRepeats) {
 TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {
   DiagnosisOptions options;
   options.share_of_found = 0.01;
-  EXPECT_TRUE(doubt_of(options, {}, {500, 600}).empty());
+  EXPECT_TRUE(doubt_of(options).empty());
   // What was brought into the second channel counts for nobody who takes it out.
-  EXPECT_EQ(doubt_of(options, {2500, 500}, {500, 600}), (Doubt{20, 100}));
+  EXPECT_EQ(doubt_of(options, {{2000, -100}}, {2500, 500}, {500, 600}), (Doubt{20, 100}));
   options.form_of_channel = {100, 0};
   options.taken_of_form = 0.5;
-  const Doubt doubt = doubt_of(options, {2500, 500}, {500, 600});
+  EXPECT_EQ(doubt_of(options), (Doubt{50, 0}));
+  const Doubt doubt = doubt_of(options, {{2000, -100}}, {2500, 500}, {500, 600});
   EXPECT_EQ(doubt, (Doubt{70, 100}));
   // 300 of 500 come from the first channel; a loss takes nothing away, a small gain all of itself.
   EXPECT_DOUBLE_EQ(counted(500, {500, 600}, {200, 400}, doubt), 330);
@@ -174,13 +175,18 @@ TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {
   EXPECT_DOUBLE_EQ(counted(110, {500, 600}, {490, 500}, doubt), 0);
 }
 
-TEST(CountedGain, DoubtsALawLessThatWasSeenToBeRight) {
+TEST(CountedGain, DoubtsAnEffectLessThatWasSeenToBeRight) {
   DiagnosisOptions options;
   options.share_of_found = 0.01;
   // It leaves 1e-5 of what it explains where it explains most: four times that much is doubted.
-  const Doubt doubt = doubt_of(options, {1e7 + 100, 1e6 + 500}, {100, 500});
+  const std::vector<double> before{1e7 + 100, 1e6 + 500}, left{100, 500};
+  const Doubt doubt = doubt_of(options, {{1e7, 1e6}}, before, left);
   EXPECT_NEAR(doubt[0], 400, 1e-6);
   EXPECT_NEAR(doubt[1], 40, 1e-6);
+  // Which says nothing about another one, that explains most elsewhere.
+  const Doubt both = doubt_of(options, {{1e7, 0}, {0, 1e6}}, before, left);
+  EXPECT_NEAR(both[0], 400, 1e-6);
+  EXPECT_NEAR(both[1], 2000, 1e-6);
 }
 
 /// Rules of a contest about a machine of which nothing is off.
@@ -410,7 +416,7 @@ TEST(Intervals, WhatALawGetsWrongAboutOneAmplitudeShowsInTheOthers) {
   FreedNumber small = large;
   small.number.key = "effects.geometry.squareness.xz_urad";
   small.value = 1;
-  m.added.push_back({.candidate = 5, .numbers = {large, small}, .gain = 0, .class_with = {}});
+  m.added.push_back({.candidate = 5, .numbers = {large, small}});
   m.columns = columns_of(evidence, m.machine, m.prediction, m.numbers());
   const auto intervals = intervals_of(evidence, m, true);
   EXPECT_GT(intervals.at(small.number.key).half_width, 1.9 * 0.02 * 50);
@@ -471,7 +477,7 @@ TEST(Intervals, CoverTheTruthAsOftenAsTheySay) {
     FittedMachine m = fit_declared(evidence, Machine());
     for (const std::size_t c : {3U, 4U}) {
       FreedNumber n{.number = all[c].numbers[0], .value = 5};
-      m.added.push_back({.candidate = c, .numbers = {n}, .gain = 0, .class_with = {}});
+      m.added.push_back({.candidate = c, .numbers = {n}});
     }
     converge(evidence, m);
     const auto intervals = intervals_of(evidence, m);

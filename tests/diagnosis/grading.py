@@ -154,6 +154,9 @@ def grade(answer, report, seconds):
                     true = answer.get("values", {}).get(key)
                     if true is None or re.search(r"phase|angle_deg", key):
                         continue
+                    # A wave half a turn on is the same wave.
+                    if "amplitude" in key and key[-2:] not in (".x", ".y", ".z") and any("phase" in k for k in numbers_of(f)):
+                        true = math.copysign(true, number["value"])
                     # A component that is nearly nothing is held against the largest of its vector.
                     scale = max(abs(v) for k, v in answer["values"].items() if stem(k) == stem(key))
                     if scale > 0:

@@ -41,6 +41,16 @@ class Grading(unittest.TestCase):
         minor = grading.grade(TRUTH, report(found("backlash", "X"), found("kv_error", "X", minor=True)), 1)
         self.assertTrue(minor["top"] and not minor["exact"])
 
+    def test_a_wave_half_a_turn_on_is_the_same(self):
+        key = "effects.probe.tip_lobing."
+        truth = {"kind": "single", "effects": [{"name": "tip_lobing", "place": "probe", "parameters": {"amplitude_um": -2.0, "phase_deg": 10.0}}],
+                 "values": {key + "amplitude_um": -2.0, key + "phase_deg": 10.0}}
+        told = found("tip_lobing", "probe", key + "amplitude_um", 2.02, 1.9, 2.1)
+        told["parameters"].append({"key": key + "phase_deg", "value": -170.0, "low": -172, "high": -168})
+        row = grading.grade(truth, report(told), 1)
+        self.assertAlmostEqual(row["errors"][0], 0.01)
+        self.assertEqual(row["covered"], [True])
+
     def test_a_true_value_of_nought_has_no_relative_error(self):
         truth = dict(TRUTH, values={"effects.X.backlash.gap_um": 0.0})
         row = grading.grade(truth, report(found("backlash", "X", "effects.X.backlash.gap_um", 4.1, 3.9, None)), 1)

@@ -195,15 +195,13 @@ def simulate(commands, drives, seed):
             external += acting * rigid
             for _ in range(kPlantPerLoop):
                 bound = level + excess * np.exp(np.abs(v_load) * inverse_vs)
+                most, least = bound, -bound
                 if has_asymmetry:
-                    sign = np.sign(v_load)
-                    bound *= 1 + d.asymmetry_dry * sign
-                    viscous = d.viscous * (1 + d.asymmetry_viscous * sign)
-                bound = share * bound
+                    most, least = bound * (1 + d.asymmetry_dry), bound * (d.asymmetry_dry - 1)
+                    viscous = d.viscous * (1 + d.asymmetry_viscous * np.sign(v_load))
                 elements += slopes * v_load
-                np.minimum(elements, bound, out=elements)
-                np.negative(bound, out=bound)
-                np.maximum(elements, bound, out=elements)
+                np.minimum(elements, share * most, out=elements)
+                np.maximum(elements, share * least, out=elements)
                 net = viscous * v_load
                 np.subtract(external, net, out=net)
                 net -= np.add.reduce(elements, axis=0)

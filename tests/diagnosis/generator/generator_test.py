@@ -82,6 +82,17 @@ class Drives(unittest.TestCase):
         np.testing.assert_allclose(s["force"][300:-50, 0, 0], expected[300:-50], atol=0.5)
         self.assertGreater(x[-1], yielding.max())
 
+    def test_asymmetric_dry_friction_is_symmetric_about_a_force(self):
+        """Elements that slide at F (1 + a) and -F (1 - a): once slid, a F more than without, also
+        while they turn round."""
+        level, share = 50.0, 0.2
+        d = bare(2, coulomb=level, bristle=1e7)
+        d.asymmetry_dry[:, 1] = share
+        to_and_fro = np.zeros((3000, 5))
+        to_and_fro[:, 0] = 2e-3 * np.sin(2 * np.pi * np.arange(3000) / 1000) ** 3
+        force = drives.simulate(to_and_fro, d, 1)["force"][:, 0]
+        np.testing.assert_allclose(force[600:, 1] - force[600:, 0], share * level, atol=0.1)
+
     def test_two_masses_ring_at_their_frequency(self):
         d = bare(stiffness=2e6, damping=0.0, kp=1e-3, kv=1e-3, inertia_ff=0.0, motor_feedback=1.0)
         d.load_force = [(0, 0, lambda t, x, v: 100.0 if t < 0.002 else 0.0)]

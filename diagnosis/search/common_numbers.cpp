@@ -1,0 +1,145 @@
+#include "diagnosis/search/common_numbers.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "model/parameters.hpp"
+
+namespace vcnc {
+namespace {
+
+constexpr double kStep = 0.1;            // of a tolerance, to see what a number does
+constexpr std::size_t kRemembered = 64;  // series
+
+double tolerance_of(const std::string& key) {
+  if (key == "probe.damping_ratio") return 0.5;
+  if (key.starts_with("axes.") && key.ends_with(".current_lag_us")) return 0.3;
+  return 0;
+}
+
+}  // namespace
+
+std::vector<FreedNumber> common_numbers(const Machine& healthy) {
+  Machine copy = healthy;
+  std::vector<FreedNumber> all;
+  for (const Parameter& p : parameters(copy)) {
+    const double value = p.in_unit(), tolerance = tolerance_of(p.key) * std::abs(value);
+    if (tolerance <= 0) continue;
+    all.push_back(
+        {.number = {.key = p.key, .typical = tolerance, .min = p.range.min, .max = p.range.max},
+         .value = value,
+         .centre = value,
+         .tolerance = tolerance,
+         .common = true});
+  }
+  return all;
+}
+
+ReplicaOfChange::ReplicaOfChange(Replica& replica, const Machine& healthy,
+                                 std::vector<FreedNumber> common)
+    : replica_(replica), common_(std::move(common)) {
+  anchor(healthy);
+  std::vector<std::size_t> all(common_.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  at_healthy_ = derivatives(healthy, all);
+}
+
+void ReplicaOfChange::anchor(const Machine& machine) {
+  anchor_ = as_declared(machine);
+  replica_.anchor(anchor_);
+  of_change_.assign(common_.size(), {});
+  latest_.clear();
+}
+
+Prediction ReplicaOfChange::predict(const Machine& hypothesis) const {
+  return std::move(predict_all({hypothesis})[0]);
+}
+
+std::vector<Prediction> ReplicaOfChange::predict_all(const std::vector<Machine>& hypotheses) const {
+  std::vector<Machine> declared;
+  for (const Machine& h : hypotheses) declared.push_back(as_declared(h));
+  std::vector<Prediction> all = replica_.predict_all(declared);
+  const std::lock_guard lock(guard_);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const std::vector<double> off = off_healthy(hypotheses[i]);
+    derive(off);
+    for (std::size_t c = 0; c < all[i].size(); ++c) all[i][c] = corrected(all[i][c], c, off);
+  }
+  return all;
+}
+
+Machine ReplicaOfChange::as_declared(const Machine& hypothesis) const {
+  std::vector<FreedNumber> declared = common_;
+  for (FreedNumber& n : declared) n.value = n.centre;
+  return with(hypothesis, declared);
+}
+
+std::vector<double> ReplicaOfChange::off_healthy(const Machine& hypothesis) const {
+  std::vector<FreedNumber> numbers = common_;
+  take_values(numbers, hypothesis);
+  std::vector<double> off;
+  for (const FreedNumber& n : numbers) off.push_back(n.value - n.centre);
+  return off;
+}
+
+std::vector<SeriesOfChannels> ReplicaOfChange::derivatives(
+    const Machine& about, const std::vector<std::size_t>& numbers) const {
+  std::vector<Machine> moved{about};
+  for (const std::size_t j : numbers) {
+    moved.push_back(about);
+    move_number(moved.back(), common_[j].number.key,
+                common_[j].centre + kStep * common_[j].tolerance);
+  }
+  const std::vector<Prediction> answers = replica_.predict_all(moved);
+  std::vector<SeriesOfChannels> all;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    SeriesOfChannels& change = all.emplace_back(channels().size());
+    const double step = kStep * common_[numbers[i]].tolerance;
+    for (std::size_t c = 0; c < change.size(); ++c) {
+      if (answers[i + 1][c].shares(answers[0][c])) continue;
+      const std::vector<double>&now = answers[i + 1][c], &before = answers[0][c];
+      for (std::size_t k = 0; k < now.size(); ++k) change[c].push_back((now[k] - before[k]) / step);
+    }
+  }
+  return all;
+}
+
+/// Of those numbers that are off and were not asked for since the last anchor.
+void ReplicaOfChange::derive(const std::vector<double>& off) const {
+  std::vector<std::size_t> unknown;
+  for (std::size_t j = 0; j < off.size(); ++j)
+    if (off[j] != 0 && of_change_[j].empty()) unknown.push_back(j);
+  if (unknown.empty()) return;
+  std::vector<SeriesOfChannels> here = derivatives(anchor_, unknown);
+  for (std::size_t i = 0; i < unknown.size(); ++i) {
+    const SeriesOfChannels& there = at_healthy_[unknown[i]];
+    for (std::size_t c = 0; c < there.size(); ++c) {
+      if (there[c].empty()) continue;
+      here[i][c].resize(there[c].size(), 0.0);
+      for (std::size_t k = 0; k < there[c].size(); ++k) here[i][c][k] -= there[c][k];
+    }
+    of_change_[unknown[i]] = std::move(here[i]);
+  }
+}
+
+SharedSeries ReplicaOfChange::corrected(const SharedSeries& series, std::size_t channel,
+                                        const std::vector<double>& off) const {
+  std::vector<double> here(off.size(), 0.0);
+  for (std::size_t j = 0; j < off.size(); ++j)
+    if (off[j] != 0 && !of_change_[j][channel].empty()) here[j] = off[j];
+  if (std::all_of(here.begin(), here.end(), [](double d) { return d == 0; })) return series;
+  for (const Corrected& known : latest_)
+    if (known.from.shares(series) && known.off == here) return known.to;
+  std::vector<double> sum = series;
+  for (std::size_t j = 0; j < here.size(); ++j)
+    for (std::size_t k = 0; here[j] != 0 && k < sum.size(); ++k)
+      sum[k] += here[j] * of_change_[j][channel][k];
+  if (latest_.size() == kRemembered) latest_.erase(latest_.begin());
+  latest_.push_back({series, std::move(here), std::move(sum)});
+  return latest_.back().to;
+}
+
+}  // namespace vcnc

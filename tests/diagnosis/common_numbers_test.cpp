@@ -1,0 +1,127 @@
+#include "diagnosis/search/common_numbers.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "diagnosis/diagnose.hpp"
+#include "diagnosis/search/differential.hpp"
+#include "tests/diagnosis/toy_machine.hpp"
+
+namespace vcnc {
+namespace {
+
+/// d (1 + s) with the damping d of the probe and a squareness of s rad; the load of X, which has
+/// nothing to do with either.
+class ProductReplica : public Replica {
+ public:
+  const std::vector<ComparedChannel>& channels() const override { return channels_; }
+  Prediction predict(const Machine& m) const override {
+    const double product = m.probe.damping_ratio * (1 + m.effects.get<Squareness>().xy);
+    if (m.axes[kX].mechanics.load != load_) load_ = m.axes[kX].mechanics.load, of_load_ = series();
+    return {SharedSeries(std::vector<double>{product}), of_load_};
+  }
+
+ private:
+  SharedSeries series() const { return SharedSeries(std::vector<double>{load_}); }
+
+  std::vector<ComparedChannel> channels_{{SignalKind::deflection, 0}, {SignalKind::force, 0}};
+  mutable double load_ = 0;
+  mutable SharedSeries of_load_;
+};
+
+Machine machine(double damping, double squareness) {
+  Machine m;
+  m.probe.damping_ratio = damping;
+  m.effects.get<Squareness>().xy = squareness;
+  return m;
+}
+
+std::vector<FreedNumber> damping_alone() {
+  std::vector<FreedNumber> all = common_numbers(machine(0.3, 0));
+  std::erase_if(all, [](const auto& n) { return n.number.key != "probe.damping_ratio"; });
+  return all;
+}
+
+TEST(CommonNumbers, AreWhatHasATolerance) {
+  Machine m = machine(0.3, 0);
+  m.axes[kX].servo.current_lag = 0;
+  m.axes[kY].servo.current_lag = 200e-6;
+  const std::vector<FreedNumber> all = common_numbers(m);
+  const auto of = [&](const std::string& key) {
+    for (const FreedNumber& n : all)
+      if (n.number.key == key) return n.tolerance;
+    return 0.0;
+  };
+  EXPECT_DOUBLE_EQ(of("probe.damping_ratio"), 0.15);
+  EXPECT_DOUBLE_EQ(of("axes.Y.current_lag_us"), 60);
+  EXPECT_EQ(of("axes.X.current_lag_us"), 0);  // there is none to be wrong about
+  for (const FreedNumber& n : all) EXPECT_TRUE(n.common);
+}
+
+TEST(CommonNumbers, DoNothingAtTheHealthyMachineAndMultiplyWithAChange) {
+  ProductReplica inner;
+  ReplicaOfChange replica(inner, machine(0.3, 0), damping_alone());
+  EXPECT_DOUBLE_EQ(replica.predict(machine(0.3, 0))[0][0], 0.3);
+  EXPECT_NEAR(replica.predict(machine(0.5, 0))[0][0], 0.3, 1e-12);
+  // y_now - y_ref = 0.5 * 1.2 - 0.5 of machines that both have 0.5.
+  replica.anchor(machine(0.5, 0.2));
+  EXPECT_NEAR(replica.predict(machine(0.5, 0.2))[0][0] - 0.3, 0.5 * 1.2 - 0.5, 1e-12);
+  EXPECT_NEAR(replica.predict(machine(0.3, 0.2))[0][0] - 0.3, 0.3 * 0.2, 1e-12);
+}
+
+TEST(CommonNumbers, LeaveSharedWhatTheyDoNotConcern) {
+  ProductReplica inner;
+  ReplicaOfChange replica(inner, machine(0.3, 0), damping_alone());
+  replica.anchor(machine(0.4, 0.2));
+  const Prediction a = replica.predict(machine(0.4, 0.2)), b = replica.predict(machine(0.4, 0.2));
+  EXPECT_TRUE(a[1].shares(b[1]));
+  EXPECT_TRUE(a[1].shares(inner.predict(machine(0.3, 0))[1]));
+}
+
+/// A toy machine whose ball follows what squareness shifts it by with a lag of 10 ms times the
+/// damping of the probe.
+class LaggingReplica : public toy::ToyReplica {
+ public:
+  explicit LaggingReplica(const Record& commands) : ToyReplica(commands), commands_(commands) {}
+  Prediction predict(const Machine& m) const override {
+    const Prediction all = ToyReplica::predict(m);
+    const std::vector<double>& y = commands_.find(SignalKind::command, 1)->value;
+    const double behind = 10 * m.probe.damping_ratio * m.effects.get<Squareness>().xy;
+    std::vector<double> reading = all[2];
+    for (std::size_t k = 1; k < reading.size(); ++k)
+      if (std::abs(y[k] - y[k - 1]) < 1e-3) reading[k] -= behind * (y[k] - y[k - 1]);
+    return {all[0], all[1], SharedSeries(std::move(reading))};
+  }
+
+ private:
+  const Record& commands_;
+};
+
+TEST(CommonNumbers, KeepAFaultFromBeingToldTwice) {
+  Record healthy = toy::commands(2048, 4), now = healthy;
+  const auto measured = [](Record& record, const Machine& truth, std::uint64_t seed) {
+    toy::measure(record, truth, seed);
+    const Prediction lagging = LaggingReplica(record).predict(truth),
+                     plain = toy::ToyReplica(record).predict(truth);
+    MeasuredSignal& reading =
+        *std::find_if(record.signals.begin(), record.signals.end(),
+                      [](const MeasuredSignal& s) { return s.kind == SignalKind::deflection; });
+    for (std::size_t k = 0; k < reading.value.size(); ++k)
+      reading.value[k] += lagging[2][k] - plain[2][k];
+  };
+  measured(healthy, machine(0.5, 0), 1);
+  measured(now, machine(0.5, 500e-6), 2);
+  LaggingReplica of_healthy(healthy), of_now(now);
+  const Machine declared = machine(0.3, 0);
+  const Diagnosis d = diagnose({now, of_now, declared, toy::candidates()},
+                               less_healthy(now, healthy, of_healthy, declared));
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
+  ASSERT_EQ(d.effects.size(), 1U);
+  EXPECT_EQ(d.effects[0].name, "squareness");
+  EXPECT_NEAR(d.effects[0].numbers[0].value, 500, 1);
+  EXPECT_EQ(d.law, std::nullopt);
+}
+
+}  // namespace
+}  // namespace vcnc
