@@ -79,7 +79,7 @@ Contest::Contest(const ContestRules& rules, const FittedMachine& now)
       now_(now),
       linear_(now.linear()),
       ground_(rules.evidence, now.residual, linear_),
-      doubt_(now.added.empty()
+      doubt_(now.added.empty() && now.released.empty()
                  ? doubt_of(rules.options)
                  : doubt_of(rules.options, now.explained(), rules.base_of, ground_.held_out_of)) {}
 

@@ -186,6 +186,7 @@ constexpr double kPulledFar = 1.5;
 std::vector<Explained> FittedMachine::explained() const {
   std::vector<Explained> all;
   for (const AddedEffect& a : added) all.push_back(a.explained);
+  for (const std::string& key : released) all.push_back(by_release.at(key));
   return all;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -27,13 +28,14 @@ struct FittedMachine {
   std::vector<AddedEffect> added;
   LinearPart nuisances;               ///< those of released declared numbers have no tolerance
   std::vector<std::string> released;  ///< declared numbers found out of tolerance
+  std::map<std::string, Explained> by_release;  ///< what releasing each of them explained
   Prediction prediction;
   Column residual;
   std::vector<Column> columns;  ///< of all numbers of `added`, in order
   double held_out = std::numeric_limits<double>::infinity();
 
   std::vector<FreedNumber> numbers() const;  ///< of all added effects
-  std::vector<Explained> explained() const;  ///< by each of them
+  std::vector<Explained> explained() const;  ///< by each, and each released number
   /// Nuisances and added effects with their columns.
   LinearPart linear() const;
   /// With a declared number that was released held again as in `base`, nothing fitted.

@@ -11,6 +11,7 @@ namespace {
 constexpr double kNormal95 = 1.96;
 /// What the scatter of few conditions misses of the variance between them.
 constexpr double kFewConditions = 1.3;
+constexpr double kFewLaps = 4;  ///< whose scatter tells nothing
 /// Standard deviation of a number, of the size of its effect, by the form of the law.
 constexpr double kKnownTo = 0.02;
 
@@ -66,30 +67,38 @@ std::map<std::string, Interval> intervals_of(const Evidence& evidence, const Fit
       information.ldlt().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
   const double ratio = std::max(1.0, sum(0, 0) / std::max(1.0, evidence.count(Role::fitted)));
 
-  std::map<std::size_t, Eigen::VectorXd> of_block, of_condition;
+  std::map<std::size_t, Eigen::VectorXd> of_block, of_condition, of_lap;
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const Block& block = evidence.partition().blocks[b];
-    if (block.held_out) continue;
     const Eigen::VectorXd score = blocks[b].block(1, 0, n, 1);
-    of_block[b] = score;
-    const auto [at, first] =
-        of_condition.try_emplace(static_cast<std::size_t>(block.condition), score);
-    if (!first) at->second += score;
+    const auto add = [&](std::map<std::size_t, Eigen::VectorXd>& clusters, std::size_t cluster) {
+      const auto [at, first] = clusters.try_emplace(cluster, score);
+      if (!first) at->second += score;
+    };
+    if (block.held_out) continue;
+    add(of_lap, block.stretch);
+    add(of_block, b);
+    add(of_condition, static_cast<std::size_t>(block.condition));
   }
   const auto clusters = static_cast<double>(of_block.size()),
-             conditions = static_cast<double>(of_condition.size());
+             conditions = static_cast<double>(of_condition.size()),
+             laps = static_cast<double>(of_lap.size());
   const Eigen::VectorXd between_blocks =
       scatter(inverse, of_block) * clusters / std::max(1.0, clusters - static_cast<double>(n));
   const Eigen::VectorXd between_conditions =
       scatter(inverse, of_condition) * conditions / std::max(1.0, conditions - 1);
+  const Eigen::VectorXd between_laps = scatter(inverse, of_lap) * laps / std::max(1.0, laps - 1);
   // With few clusters their scatter tells nothing.
   const bool enough = clusters > 3 * static_cast<double>(n), several = conditions > 3;
   const double few = several ? kFewConditions * student_95(conditions - 1) : 0;
+  const double of_laps =
+      laps > kFewLaps && evidence.partition().repeated && !inexact ? kNormal95 : 0;
   for (Eigen::Index i = 0; i < n; ++i) {
     const FreedNumber& number = all.numbers[static_cast<std::size_t>(i)];
-    const double noise =
+    const double noise = std::max(
         kNormal95 *
-        std::sqrt(std::max({0.0, ratio * inverse(i, i), enough ? between_blocks[i] : 0.0}));
+            std::sqrt(std::max({0.0, ratio * inverse(i, i), enough ? between_blocks[i] : 0.0})),
+        of_laps * std::sqrt(between_laps[i]));
     const double form =
         inexact
             ? std::hypot(few * std::sqrt(between_conditions[i]),

@@ -262,10 +262,13 @@ class Search {
   }
 
   void add(FittedMachine& m, const Contender& best, const std::vector<std::size_t>& equivalent) {
+    const Explained explained =
+        minus(evidence_.chi2_of(m.residual, Role::held_out), best.fit.held_out_of);
     if (!best.released.empty()) {
       for (FreedNumber& n : m.nuisances.numbers)
         if (n.number.key == best.released) n.tolerance = 0;
       m.released.push_back(best.released);
+      m.by_release[best.released] = explained;
       add_common(evidence_, m, options_.common);
       converge(evidence_, m);
       settle_in(evidence_, m);
@@ -277,8 +280,6 @@ class Search {
       for (std::size_t c = 0; c < candidates_.size(); ++c)
         for (const FreeNumber& own : candidates_[c].numbers)
           if (own.key == n.number.key) owners.insert(c);
-    const Explained explained =
-        minus(evidence_.chi2_of(m.residual, Role::held_out), best.fit.held_out_of);
     for (const std::size_t owner : owners) {
       AddedEffect added{.candidate = owner, .gain = best.gain, .explained = explained};
       for (const FreedNumber& n : best.numbers)

@@ -492,5 +492,32 @@ TEST(Intervals, CoverTheTruthAsOftenAsTheySay) {
   EXPECT_LE(inside, 0.999 * numbers);
 }
 
+TEST(Intervals, KnowThatLapsAreNotAlike) {
+  int inside = 0, numbers = 0;
+  double widths = 0;
+  for (std::uint64_t seed = 2000; seed < 2040; ++seed) {
+    Record record = toy::commands(400, 4);
+    toy::measure(record, Machine(), seed);
+    const std::vector<double> x = record.find(SignalKind::command, 0)->value;
+    for (std::size_t lap = 0; lap < record.stretches.size(); ++lap)
+      for (std::size_t k = record.stretches[lap].begin; k < record.stretches[lap].end; ++k)
+        record.signals.back().value[k] += 0.5e-6 * gaussian_noise(seed, 88, lap)[0] * x[k];
+    toy::ToyReplica replica(record);
+    Evidence evidence(record, replica, Machine());
+    FittedMachine m = fit_declared(evidence, Machine());
+    m.added.push_back({.candidate = 3, .numbers = {{.number = toy::candidates()[3].numbers[0]}}});
+    m.nuisances = without(m.nuisances, m.numbers());
+    converge(evidence, m);
+    const FreedNumber scale = m.numbers()[0];
+    const double half = intervals_of(evidence, m).at(scale.number.key).half_width;
+    inside += std::abs(scale.value) <= half;
+    widths += half;
+    ++numbers;
+  }
+  EXPECT_GE(inside, 0.85 * numbers);
+  // Six fitted laps of 0.5 ppm each, 2.2 standard deviations; white noise alone would make 0.2.
+  EXPECT_NEAR(widths / numbers, 2.2 * 0.5 / std::sqrt(6), 0.15);
+}
+
 }  // namespace
 }  // namespace vcnc
