@@ -112,6 +112,7 @@ class Report {
     tell_figures();
     tell_ladder();
     judge();
+    leave_common_as_declared();
     return std::move(d_);
   }
 
@@ -605,6 +606,12 @@ class Report {
       for (std::size_t c = 0; c < channels.size(); ++c)
         d_.figures.push_back({channels[c], name, evidence_.rms(before, c, role),
                               evidence_.rms(after, c, role), evidence_.noise().channels[c].rms});
+  }
+
+  /// They say what a change does, not what the machine is (common_numbers.hpp).
+  void leave_common_as_declared() {
+    for (const FreedNumber& n : found().nuisances.numbers)
+      if (n.common) move_number(d_.found, n.number.key, n.centre);
   }
 
   void tell_ladder() {
