@@ -52,10 +52,21 @@ void predict_tests(const DiagnoseOptions& options, const Machine& declared, cons
   }
 }
 
+DifferentialRecord less_reference(const DiagnoseOptions& options, const Record& record,
+                                  const Machine& declared) {
+  const Record reference = load_record(options.reference, options.map);
+  return less_healthy(record, reference, *replica_of(reference, declared), declared);
+}
+
 int compare_models(const DiagnoseOptions& options, const Record& record, const Machine& declared) {
   const Machine found = load_machine(options.compare);
   std::vector<SignalFigure> figures;
-  append_figures(figures, record, declared, found, "run");
+  if (options.reference.empty()) {
+    append_figures(figures, record, declared, found, "run");
+  } else {
+    const DifferentialRecord difference = less_reference(options, record, declared);
+    append_figures(figures, difference.record, difference.healthy, found, "run");
+  }
   predict_tests(options, declared, found, figures);
   std::cout << figures_table(figures);
   return stop_requested() ? kExitInterrupted : kExitOk;
@@ -86,10 +97,7 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
     d = diagnose(of, {}, keep_going);
   } else {
     progress.show("fitting the reference run");
-    const Record reference = load_record(options.reference, options.map);
-    const auto replica_of_reference = replica_of(reference, declared);
-    const DifferentialRecord difference =
-        less_healthy(record, reference, *replica_of_reference, declared);
+    const DifferentialRecord difference = less_reference(options, record, declared);
     seen = difference.record;
     d = diagnose(of, difference, {}, keep_going);
   }
