@@ -104,6 +104,25 @@ TEST_F(DiagnoseCli, RefusesWhatItCannotUseAndLeavesNothingBehind) {
   EXPECT_EQ(read_text(scratch_ / "mine/thesis.txt"), "do not lose");
 }
 
+TEST_F(DiagnoseCli, TwoMachinesAreComparedAgainstARunLessItsHealthyOne) {
+  write_text(scratch_ / "strokes.ngc", "G21 G90 G94\nG1 X10 F3000\nX0\nX10\nX0\nM30\n");
+  const std::string run = scratch_ / "run",
+                    machine = std::string(VCNC_SOURCE_DIR) + "/configs/machines/trunnion.toml";
+  const Said ran = vcnc("run " + (scratch_ / "strokes.ngc") + " --machine " + machine +
+                        " --inject X.coulomb.level_N=200 --in-process --no-report --out " + run);
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  // RMS of what the declared machine is off the force of X, which has no friction.
+  const auto off = [&](const std::string& more) {
+    const Said said =
+        vcnc("diagnose " + run + " --model " + machine + " --compare-only " + machine + more);
+    EXPECT_EQ(said.code, 0) << said.err;
+    const std::size_t row = said.out.find("force X"), value = said.out.find("run", row) + 3;
+    return row == std::string::npos ? -1.0 : std::stod(said.out.substr(value));
+  };
+  EXPECT_GT(off(""), 50);
+  EXPECT_NEAR(off(" --reference " + run), 0, 1e-6);  // the healthy run is as far off
+}
+
 TEST_F(DiagnoseCli, TheMapHasItsReference) {
   const Said said = vcnc("import --keys");
   EXPECT_EQ(said.code, 0);
