@@ -9,6 +9,7 @@
 #include "diagnosis/search/common_numbers.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/period_slip_search.hpp"
+#include "diagnosis/search/simplest_form.hpp"
 
 namespace vcnc {
 namespace {
@@ -55,8 +56,9 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
   if (before.slip) declared.effects.get<PeriodSlip>() = *before.slip;
   Evidence evidence(of.record, of.replica, declared, difference ? difference->noise_scale : 1);
   before.chatter = find_chatter(evidence, declared, of.candidates,
-                                difference ? difference->lines : std::vector<NoiseLine>{});
+                                difference ? difference->noise : HealthyNoise{});
   for (const Chatter& c : before.chatter) {
+    if (!c.hides_drive()) continue;
     evidence.leave_out_drive(c.axis);
     options.vibrating.push_back(c.axis);
   }
@@ -75,6 +77,8 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
   options.share_of_found = kShareOfFound;
   SelectionResult selection =
       select_effects_of(evidence, declared, of.candidates, options, keep_going);
+  bring_to_simplest_form(evidence, declared, of.candidates, options, selection.floor,
+                         selection.found);
   return findings_of(of, evidence, options, std::move(selection), std::move(before),
                      difference != nullptr);
 }

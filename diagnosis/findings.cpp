@@ -20,17 +20,9 @@
 namespace vcnc {
 namespace {
 
-/// Of the noise of a sample: two machines that differ by less are the same.
-constexpr double kSameMachine = 1e-3;
-/// Of the noise's chi-square: a form that leaves less in every channel makes no model inexact.
-constexpr double kExactForm = 0.01;
 constexpr double kQuiet = 1.05, kAllExplained = 0.98;
 /// Part of the noise's chi-square that no law is sought in.
 constexpr double kFloorScatter = 0.04;
-/// A number that costs less chi-square to be as declared is put back: this much, or this part of
-/// what an effect must gain.
-constexpr double kUnneeded = 4, kUnneededPart = 0.25;
-
 const EffectText* text_of(const std::string& effect) {
   const EffectText* text = nullptr;
   for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
@@ -82,7 +74,8 @@ class Report {
         options_(options),
         selection_(std::move(selection)),
         before_(std::move(before)),
-        floor_(selection_.floor) {
+        floor_(selection_.floor),
+        inexact_(is_inexact(evidence, options, floor_, selection_.found.held_out)) {
     d_.differential = differential;
     d_.declared = of.declared;
     d_.found = selection_.found.machine;
@@ -94,9 +87,6 @@ class Report {
   }
 
   Diagnosis write() {
-    put_back_unneeded();
-    put_back_undetermined();
-    prefer_positive();
     tell_slip();
     tell_effects();
     tell_clamping();
@@ -120,130 +110,6 @@ class Report {
   const FittedMachine& found() const { return selection_.found; }
   double excess(double held_out) const { return std::max(0.0, held_out - floor_); }
 
-  /// Whether the model is known to be more than noise off the machine.
-  bool inexact() const {
-    const std::vector<double>& form = options_.form_of_channel;
-    for (std::size_t c = 0; c < form.size(); ++c)
-      if (form[c] > kExactForm * evidence_.count(c, Role::held_out)) return true;
-    return found().held_out > options_.model_form * floor_;
-  }
-
-  /// A flexible effect has numbers that the record can do without: they go back to the declaration,
-  /// the least needed first.
-  void put_back_unneeded() {
-    FittedMachine& m = selection_.found;
-    for (AddedEffect& a : m.added) {
-      const auto is_amplitude = [&](const FreedNumber& n) { return !is_shape(a, n); };
-      while (std::count_if(a.numbers.begin(), a.numbers.end(), is_amplitude) > 1) {
-        const double chi2 = evidence_.chi2(m.residual, Role::both);
-        double least = std::max(kUnneeded, kUnneededPart * options_.least_gain);
-        std::size_t which = a.numbers.size();
-        Machine without;
-        for (std::size_t i = 0; i < a.numbers.size(); ++i) {
-          if (!is_amplitude(a.numbers[i])) continue;
-          Machine less = m.machine;
-          const std::string& key = a.numbers[i].number.key;
-          move_number(less, key, number_of(of_.declared, key));
-          const double cost =
-              evidence_.chi2(evidence_.residual(evidence_.predict(less)), Role::both) - chi2;
-          if (cost >= least) continue;
-          least = cost, which = i, without = std::move(less);
-        }
-        if (which == a.numbers.size()) break;
-        forget(m, a, which);
-        m.machine = std::move(without);
-        m.prediction = evidence_.predict(m.machine);
-        m.residual = evidence_.residual(m.prediction);
-      }
-    }
-    d_.found = m.machine;
-  }
-
-  /// Of several amplitudes of an effect, those that may as well be as declared go back there, the
-  /// least certain first, and everything else is fitted again.
-  void put_back_undetermined() {
-    FittedMachine& m = selection_.found;
-    while (true) {
-      const std::map<std::string, Interval> intervals = intervals_of(evidence_, m, inexact());
-      double least = 1;
-      std::size_t effect = m.added.size(), number = 0;
-      for (std::size_t e = 0; e < m.added.size(); ++e) {
-        const AddedEffect& a = m.added[e];
-        const auto amplitudes =
-            std::count_if(a.numbers.begin(), a.numbers.end(),
-                          [&](const FreedNumber& n) { return !is_shape(a, n); });
-        for (std::size_t i = 0; i < a.numbers.size() && amplitudes > 1; ++i) {
-          const FreedNumber& n = a.numbers[i];
-          const auto known = intervals.find(n.number.key);
-          if (is_shape(a, n) || known == intervals.end()) continue;
-          const double off = std::abs(n.value - number_of(of_.declared, n.number.key)),
-                       certain = off / std::max(known->second.half_width, 1e-300);
-          if (certain < least) least = certain, effect = e, number = i;
-        }
-      }
-      if (effect == m.added.size()) break;
-      const std::string key = m.added[effect].numbers[number].number.key;
-      FittedMachine less = m;
-      forget(less, less.added[effect], number);
-      move_number(less.machine, key, number_of(of_.declared, key));
-      converge(evidence_, less);
-      if (less.held_out > m.held_out + options_.least_gain) break;
-      m = std::move(less);
-    }
-    d_.found = m.machine;
-  }
-
-  /// Whether a number only shapes its effect.
-  bool is_shape(const AddedEffect& a, const FreedNumber& n) const {
-    const Candidate& candidate = of_.candidates[a.candidate];
-    return std::any_of(candidate.shape.begin(), candidate.shape.end(),
-                       [&](std::size_t s) { return candidate.numbers[s].key == n.number.key; });
-  }
-
-  /// A wave of a negative amplitude is one of a positive amplitude half a period on: the first
-  /// amplitude is told positive where that is the same machine.
-  void prefer_positive() {
-    FittedMachine& m = selection_.found;
-    for (AddedEffect& a : m.added) {
-      const auto phase = std::find_if(a.numbers.begin(), a.numbers.end(),
-                                      [](const FreedNumber& n) { return is_phase(n.number); });
-      if (phase == a.numbers.end()) continue;
-      std::vector<FreedNumber> turned = a.numbers;
-      bool negative = false, first = true;
-      for (FreedNumber& n : turned) {
-        if (is_phase(n.number)) n.value = std::remainder(n.value, 360);
-        if (n.shape || is_phase(n.number) || has_no_phase(n.number)) continue;
-        if (first) negative = n.value < 0;
-        first = false;
-        n.value = -n.value;
-      }
-      std::vector<FreedNumber> told = a.numbers;
-      told[static_cast<std::size_t>(phase - a.numbers.begin())].value =
-          std::remainder(phase->value, 360);
-      if (negative) {
-        FreedNumber& p = turned[static_cast<std::size_t>(phase - a.numbers.begin())];
-        p.value = std::remainder(p.value + 180, 360);
-        const Prediction same = evidence_.predict(with(m.machine, turned));
-        if (consequence(evidence_, same, m.prediction).of_noise < kSameMachine) told = turned;
-      }
-      a.numbers = std::move(told);
-      m.machine = with(m.machine, a.numbers);
-    }
-    d_.found = m.machine;
-  }
-
-  /// A number of an added effect leaves the fit, and its column with it.
-  static void forget(FittedMachine& m, AddedEffect& of, std::size_t number) {
-    std::size_t column = number;
-    for (const AddedEffect& a : m.added) {
-      if (&a == &of) break;
-      column += a.numbers.size();
-    }
-    of.numbers.erase(of.numbers.begin() + static_cast<std::ptrdiff_t>(number));
-    if (column < m.columns.size())
-      m.columns.erase(m.columns.begin() + static_cast<std::ptrdiff_t>(column));
-  }
-
   static std::string name_of(const FoundEffect& e) {
     return e.name == "deviation" ? e.place : e.place + "." + e.name;
   }
@@ -258,8 +124,7 @@ class Report {
     if (within_form)
       d_.notes.push_back(
           fmt::format("{} fits, but moves the reading by {:.2g} um rms only: what the model gets "
-                      "wrong about the "
-                      "healthy machine changes by as much ({:.2g} um).",
+                      "wrong about the healthy machine changes by as much ({:.2g} um).",
                       name_of(e), e.contour_error_um, options_.form_um));
     else
       d_.notes.push_back(fmt::format(
@@ -272,7 +137,7 @@ class Report {
   }
 
   void tell_effects() {
-    const std::map<std::string, Interval> intervals = intervals_of(evidence_, found(), inexact());
+    const std::map<std::string, Interval> intervals = intervals_of(evidence_, found(), inexact_);
     const auto fitted = [&](const FreedNumber& n) {
       const auto i = intervals.find(n.number.key);
       const double half = i == intervals.end() ? 0 : i->second.half_width;
@@ -372,7 +237,11 @@ class Report {
   void tell_chatter() {
     for (const Chatter& chatter : before_.chatter) {
       const std::string_view axis = kAxisNames[chatter.axis];
-      std::string text = fmt::format("{} vibrates by itself: {}", axis, vibration(chatter.line));
+      std::string text =
+          chatter.has_line()
+              ? fmt::format("{} vibrates by itself: {}", axis, vibration(chatter.line))
+              : fmt::format("{} is restless: {}, {:.0f} times as much as in the healthy run", axis,
+                            trembling(chatter.unrest), chatter.times);
       if (chatter.causes.empty() || !chatter.causes.front().as_strong) {
         std::string likely;
         for (const ChatterCause& c : chatter.causes)
@@ -381,8 +250,9 @@ class Report {
                     of_.candidates[c.candidate].name();
         if (likely.empty()) likely = fmt::format(" No effect on the drive of {} does so", axis);
         d_.notes.push_back(text + "." + likely + ".");
-        d_.vibrations.push_back(
-            fmt::format("{} vibrates by itself at {:.0f} Hz", axis, chatter.line.frequency));
+        if (chatter.has_line())
+          d_.vibrations.push_back(
+              fmt::format("{} vibrates by itself at {:.0f} Hz", axis, chatter.line.frequency));
         continue;
       }
       const ChatterCause& cause = chatter.causes.front();
@@ -391,7 +261,8 @@ class Report {
           "{}. So does the model with {}: {}. Such a vibration has no phase that repeats, so that "
           "amplitudes were compared and not samples; what else the drive of {} does was not "
           "sought.",
-          text, candidate.name(), vibration(cause.line), axis));
+          text, candidate.name(),
+          chatter.has_line() ? vibration(cause.line) : trembling(cause.unrest), axis));
       FoundEffect e;
       e.name = candidate.effect;
       e.place = candidate.place;
@@ -414,6 +285,13 @@ class Report {
                        line.frequency, line.amplitude * unit.factor, unit.name);
   }
 
+  static std::string trembling(const Unrest& u) {
+    const ShownUnit unit = shown_unit(u.channel);
+    return fmt::format("{} {} by {:.3g} {} rms", channel_name(u.channel),
+                       u.at_rest ? "trembles at rest" : "differs from lap to lap",
+                       u.rms * unit.factor, unit.name);
+  }
+
   /// Whether a line is that of an axis that vibrates by itself.
   bool is_of_chatter(const NoiseLine& line) const {
     return std::any_of(before_.chatter.begin(), before_.chatter.end(), [&](const Chatter& c) {
@@ -431,7 +309,7 @@ class Report {
 
   /// Where the piece was clamped is part of every fit; it is told where it is worth a word.
   void tell_clamping() {
-    const std::map<std::string, Interval> intervals = intervals_of(evidence_, found(), inexact());
+    const std::map<std::string, Interval> intervals = intervals_of(evidence_, found(), inexact_);
     std::map<std::string, FoundEffect> by_effect;
     for (const FreedNumber& n : found().nuisances.numbers) {
       const std::string& key = n.number.key;
@@ -556,7 +434,6 @@ class Report {
       }
     }
     if (law.gain < needed || (quiet && !withdrawn_)) return;
-    law_gain_ = law.gain;
     d_.law = law.law;
     d_.found = law.machine;
   }
@@ -652,8 +529,7 @@ class Report {
       d_.warnings.push_back(fmt::format(
           "Model form error: {:.0f} % of what the declared machine does not explain is still there "
           "({:.2f} times the noise). Against the declared machine alone no effect can be called "
-          "the "
-          "cause; compare with a healthy run of the same program.",
+          "the cause; compare with a healthy run of the same program.",
           100 * d_.model_form_share, ratio));
     }
   }
@@ -664,7 +540,7 @@ class Report {
   SelectionResult selection_;
   FoundBeforehand before_;
   double floor_;
-  double law_gain_ = 0;
+  bool inexact_;  ///< the model is known not to be the machine
   bool withdrawn_ = false;
   Diagnosis d_;
 };

@@ -14,10 +14,6 @@
 //
 // What moves the contour by less than 0.01 um and every signal by less than a tenth of its noise is
 // a note, not an effect.
-//
-// Intervals: 95 %, the larger of the information matrix (inflated by c) and the sandwich with
-// seconds of laps as clusters (White, Econometrica 48 (1980) 817; Liang & Zeger, Biometrika 73
-// (1986) 13), declared tolerances included.
 #pragma once
 
 #include <optional>

@@ -13,13 +13,9 @@ constexpr double kLoud = 300;  ///< power over the noise around
 constexpr double kFrequency = 2;
 constexpr double kAmplitude = 30;  ///< differs as much as the frequency does by kFrequency
 constexpr double kAsStrong = 3;
+constexpr double kRestless = 3;  ///< times what the healthy run was
 constexpr double kSizes[] = {0.25, 1, 4};
 constexpr double kBetween = 2;  ///< from one size to where the next begins
-
-bool is_of_drive(const ComparedChannel& channel, std::size_t axis) {
-  return channel.axis == axis &&
-         (channel.kind == SignalKind::position || channel.kind == SignalKind::force);
-}
 
 bool is_of_drive(const Candidate& c, std::size_t axis) {
   return c.place == kAxisNames[axis] &&
@@ -44,100 +40,138 @@ double factors(double a, double b, double base) {
   return std::abs(std::log(a / b)) / std::log(base);
 }
 
-bool is_like(const NoiseLine& model, const NoiseLine& measured) {
-  return model.strength > 0 && factors(model.frequency, measured.frequency, kFrequency) <= 1;
-}
-
-/// How unlike two vibrations are.
-double unlike(const NoiseLine& model, const NoiseLine& measured) {
-  return std::max(factors(model.frequency, measured.frequency, kFrequency),
-                  factors(model.amplitude, measured.amplitude, kAmplitude));
+/// In the healthy run; 0: not known.
+double before(const HealthyNoise& healthy, const Unrest& of) {
+  for (const Unrest& u : healthy.unrest)
+    if (u.channel.kind == of.channel.kind && u.channel.axis == of.channel.axis &&
+        u.at_rest == of.at_rest)
+      return u.rms;
+  return 0;
 }
 
 class ChatterSearch {
  public:
   ChatterSearch(const Evidence& evidence, const Machine& declared,
-                const std::vector<Candidate>& candidates)
-      : evidence_(evidence), declared_(declared), candidates_(candidates) {}
+                const std::vector<Candidate>& candidates, const HealthyNoise& healthy)
+      : evidence_(evidence),
+        declared_(declared),
+        candidates_(candidates),
+        healthy_(healthy),
+        measured_(unrest_of(evidence)) {}
 
-  std::vector<ChatterCause> causes_of(std::size_t axis, const NoiseLine& measured) const {
-    std::vector<std::size_t> owner;
-    std::vector<double> sizes;
-    std::vector<Machine> machines;
-    for (std::size_t c = 0; c < candidates_.size(); ++c) {
-      if (!is_of_drive(candidates_[c], axis)) continue;
-      for (const double size : kSizes) {
-        owner.push_back(c);
-        sizes.push_back(size);
-        machines.push_back(with_candidate(declared_, candidates_[c], size));
-      }
+  /// Nothing but the axis where its drive is as it was.
+  Chatter chatter_of(std::size_t axis) const {
+    Chatter c{.axis = axis, .line = {}, .unrest = {}, .causes = {}};
+    for (const Unrest& u : measured_) {
+      const double was = before(healthy_, u);
+      if (!is_of_drive(u.channel, axis) || was <= 0 || u.rms < c.times * was) continue;
+      c.unrest = u;
+      c.times = u.rms / was;
     }
-    const std::vector<Vibration> lines = vibrations_of(machines, measured.channel);
+    const NoiseLine line = strongest(evidence_.noise().lines, axis),
+                    was = strongest(healthy_.lines, axis);
+    if (line.strength > 0 && !(was.strength > 0 && line.amplitude < 2 * was.amplitude))
+      c.line = line;
+    if (c.has_line() || c.times > kRestless) c.causes = causes_of(c);
+    return c;
+  }
+
+ private:
+  /// A candidate of the drive at one size, and what the model does with it.
+  struct Tried {
+    std::size_t candidate = 0;
+    double size = 0;
+    ChatterCause does;
+  };
+
+  std::vector<ChatterCause> causes_of(const Chatter& chatter) const {
     std::vector<ChatterCause> causes;
-    for (std::size_t i = 0; i < machines.size(); ++i) {
-      const auto& [line, as_strong] = lines[i];
-      if (!is_like(line, measured)) continue;
-      if (causes.empty() || causes.back().candidate != owner[i])
-        causes.push_back({owner[i], sizes[i], 0, 0, line, as_strong});
+    for (const Tried& t : tried(chatter)) {
+      if (!is_like(t.does, chatter)) continue;
+      if (causes.empty() || causes.back().candidate != t.candidate) causes.push_back(t.does);
       ChatterCause& cause = causes.back();
-      const FreeNumber& number = candidates_[owner[i]].numbers.front();
+      const FreeNumber& number = candidates_[t.candidate].numbers.front();
       const double first = number_of(declared_, number.key), unit = number.typical;
-      if (cause.high == 0) cause.low = first + unit * sizes[i] / kBetween;
-      cause.high = first + unit * sizes[i] * kBetween;
+      if (cause.high == 0) cause.low = first + unit * t.size / kBetween;
+      cause.high = first + unit * t.size * kBetween;
       // Sizes go up by a constant factor: the middle one of those so far.
       cause.size = std::sqrt((cause.low - first) * (cause.high - first)) / unit;
-      if (unlike(line, measured) >= unlike(cause.line, measured)) continue;
-      cause.line = line;
-      cause.as_strong = as_strong;
+      if (unlike(t.does, chatter) >= unlike(cause, chatter)) continue;
+      cause.line = t.does.line;
+      cause.unrest = t.does.unrest;
+      cause.as_strong = t.does.as_strong;
     }
     std::stable_sort(causes.begin(), causes.end(), [&](const auto& x, const auto& y) {
       if (x.as_strong != y.as_strong) return x.as_strong;
-      return unlike(x.line, measured) < unlike(y.line, measured);
+      return unlike(x, chatter) < unlike(y, chatter);
     });
     return causes;
   }
 
- private:
-  struct Vibration {
-    NoiseLine line;
-    bool as_strong = false;
-  };
+  static bool is_like(const ChatterCause& model, const Chatter& measured) {
+    if (!measured.has_line()) return model.as_strong;
+    return model.line.strength > 0 &&
+           factors(model.line.frequency, measured.line.frequency, kFrequency) <= 1;
+  }
 
-  /// Strongest line of a channel by each machine, as laps of it differ.
-  std::vector<Vibration> vibrations_of(const std::vector<Machine>& machines,
-                                       const ComparedChannel& channel) const {
-    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
-    std::size_t at = 0;
-    while (channels[at].kind != channel.kind || channels[at].axis != channel.axis) ++at;
-    std::vector<Vibration> all;
+  /// How unlike two vibrations are.
+  static double unlike(const ChatterCause& model, const Chatter& measured) {
+    if (!measured.has_line()) return factors(model.unrest.rms, measured.unrest.rms, kAsStrong);
+    return std::max(factors(model.line.frequency, measured.line.frequency, kFrequency),
+                    factors(model.line.amplitude, measured.line.amplitude, kAmplitude));
+  }
+
+  std::vector<Tried> tried(const Chatter& chatter) const {
+    std::vector<Tried> all;
+    std::vector<Machine> machines;
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      if (!is_of_drive(candidates_[c], chatter.axis)) continue;
+      for (const double size : kSizes) {
+        all.push_back({c, size, {.candidate = c, .size = size, .line = {}, .unrest = {}}});
+        machines.push_back(with_candidate(declared_, candidates_[c], size));
+      }
+    }
     for (std::size_t first = 0; first < machines.size(); first += Evidence::kTogether) {
       const std::size_t last = std::min(first + Evidence::kTogether, machines.size());
       const std::vector<Prediction> predictions =
           evidence_.predict_all({machines.begin() + static_cast<std::ptrdiff_t>(first),
                                  machines.begin() + static_cast<std::ptrdiff_t>(last)});
-      for (const Prediction& p : predictions)
-        all.push_back(
-            {strongest(vibrations(evidence_.record(), evidence_.partition(), channel, p[at]),
-                       channel.axis),
-             as_strong(p, channel.axis)});
+      for (std::size_t i = first; i < last; ++i) look(predictions[i - first], chatter, all[i].does);
     }
     return all;
   }
 
-  /// Whether laps of a prediction differ as much as those of the record in every signal of a drive.
-  bool as_strong(const Prediction& p, std::size_t axis) const {
-    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
-    for (std::size_t c = 0; c < channels.size(); ++c) {
-      if (!is_of_drive(channels[c], axis)) continue;
-      const double model = lap_scatter(evidence_.partition(), p[c]);
-      if (factors(model, evidence_.noise().channels[c].rms, kAsStrong) > 1) return false;
+  /// What a prediction does in the signals of the drive.
+  void look(const Prediction& prediction, const Chatter& chatter, ChatterCause& does) const {
+    if (chatter.has_line()) does.line = line_of(prediction, chatter.line.channel);
+    const bool at_rest = chatter.unrest.at_rest && !chatter.has_line();
+    does.as_strong = true;
+    const std::vector<Unrest> model = unrest_of(evidence_, prediction);
+    for (std::size_t i = 0; i < model.size(); ++i) {
+      const Unrest& is = measured_[i];
+      if (!is_of_drive(is.channel, chatter.axis) || is.rms <= 0) continue;
+      if (is.at_rest != at_rest) continue;
+      const double rms = std::hypot(model[i].rms, before(healthy_, is));
+      if (factors(rms, is.rms, kAsStrong) > 1) does.as_strong = false;
+      if (is.channel.kind == chatter.unrest.channel.kind)
+        does.unrest = {is.channel, is.at_rest, rms};
     }
-    return true;
+  }
+
+  /// The strongest line in a channel, as laps of a prediction differ.
+  NoiseLine line_of(const Prediction& prediction, const ComparedChannel& channel) const {
+    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
+    std::size_t at = 0;
+    while (channels[at].kind != channel.kind || channels[at].axis != channel.axis) ++at;
+    return strongest(vibrations(evidence_.record(), evidence_.partition(), channel, prediction[at]),
+                     channel.axis);
   }
 
   const Evidence& evidence_;
   const Machine& declared_;
   const std::vector<Candidate>& candidates_;
+  const HealthyNoise& healthy_;
+  std::vector<Unrest> measured_;
 };
 
 }  // namespace
@@ -155,15 +189,12 @@ Machine with_candidate(Machine machine, const Candidate& c, double size) {
 
 std::vector<Chatter> find_chatter(const Evidence& evidence, const Machine& declared,
                                   const std::vector<Candidate>& candidates,
-                                  const std::vector<NoiseLine>& before) {
+                                  const HealthyNoise& healthy) {
+  const ChatterSearch search(evidence, declared, candidates, healthy);
   std::vector<Chatter> all;
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    const NoiseLine line = strongest(evidence.noise().lines, axis);
-    const NoiseLine was = strongest(before, axis);
-    if (line.strength == 0 || (was.strength > 0 && line.amplitude < 2 * was.amplitude)) continue;
-    all.push_back(
-        {axis, line, ChatterSearch(evidence, declared, candidates).causes_of(axis, line)});
-  }
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (Chatter c = search.chatter_of(axis); c.has_line() || c.times > kRestless)
+      all.push_back(std::move(c));
   return all;
 }
 

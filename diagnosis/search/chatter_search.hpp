@@ -11,6 +11,12 @@
 // are one class. They explain the vibration where the model also vibrates as strongly, within a
 // factor of three in every signal of the drive; else they are what is likely.
 //
+// Play may also rattle without a line, faster than a record of 1 kHz can show, or only while the
+// axis stands, where no lap is compared. Then the drive is more restless than in the healthy run
+// (unrest.hpp), three times as much in some signal. Causes are those candidates that make the model
+// as restless in every signal under the same condition, in motion or at rest, within a factor of
+// three; without any, the drive is as good as any other.
+//
 // Validity: frequencies below half the rate of the record; an axis of which the position or the
 // force is recorded. Limit cycles of play: Nordin & Gutman, Automatica 38 (2002) 1633-1649.
 #pragma once
@@ -21,6 +27,7 @@
 #include "diagnosis/search/candidate.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/noise_audit.hpp"
+#include "diagnosis/search/unrest.hpp"
 
 namespace vcnc {
 
@@ -29,23 +36,30 @@ struct ChatterCause {
   std::size_t candidate = 0;
   double size = 0;           ///< middle of those that do so, in usual ones
   double low = 0, high = 0;  ///< of its first number, in the unit of the key
-  NoiseLine line;            ///< of the model, the likest
+  NoiseLine line;            ///< of the model, the likest; where the machine has one
+  Unrest unrest;             ///< of the model in the signal that has grown most
   bool as_strong = false;    ///< as the machine's, there
 };
 
 struct Chatter {
   std::size_t axis = 0;
-  NoiseLine line;                    ///< strongest, as measured
+  NoiseLine line;                    ///< strongest, as measured; strength 0: none
+  Unrest unrest;                     ///< that of its signals which has grown most
+  double times = 0;                  ///< what it was in the healthy run
   std::vector<ChatterCause> causes;  ///< the likest first; none: something outside the drive
+
+  bool has_line() const { return line.strength > 0; }
+  /// Whether what the drive does can be told from what it should do.
+  bool hides_drive() const { return has_line() || !causes.empty(); }
 };
 
 /// A machine with a candidate: its first number larger by `size` usual ones, the others as usual
 /// where they are nothing.
 Machine with_candidate(Machine machine, const Candidate& candidate, double size);
 
-/// `before`: what vibrated already when the machine was healthy.
+/// `healthy`: how it was when the machine was healthy; nothing where that is not known.
 std::vector<Chatter> find_chatter(const Evidence& evidence, const Machine& declared,
                                   const std::vector<Candidate>& candidates,
-                                  const std::vector<NoiseLine>& before);
+                                  const HealthyNoise& healthy);
 
 }  // namespace vcnc

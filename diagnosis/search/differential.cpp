@@ -76,11 +76,11 @@ Record without_outliers(Record record, const Replica& replica, const Machine& de
   return record;
 }
 
-/// The declared machine with the piece where it was clamped for a run; what vibrates in it, and
-/// what was not the same in all laps.
+/// The declared machine with the piece where it was clamped for a run; its noise, and what was not
+/// the same in all laps.
 struct Clamped {
   Machine machine;
-  std::vector<NoiseLine> lines;
+  HealthyNoise noise;
   std::vector<LapEvent> events;
 };
 
@@ -90,7 +90,8 @@ Clamped as_clamped(const Record& run, Replica& replica, const Machine& declared)
   std::vector<FreedNumber> clamping = nuisances(declared);
   std::erase_if(clamping,
                 [](const FreedNumber& n) { return !n.number.key.starts_with("effects.setup."); });
-  return {fit_numbers(evidence, declared, std::move(clamping)).machine, evidence.noise().lines,
+  return {fit_numbers(evidence, declared, std::move(clamping)).machine,
+          {evidence.noise().lines, unrest_of(evidence)},
           evidence.events()};
 }
 
@@ -107,7 +108,7 @@ bool unlike(const std::vector<LapEvent>& events, const MeasuredSignal& signal, s
 DifferentialRecord less_healthy(const Record& now, const Record& healthy, Replica& of_healthy,
                                 const Machine& declared) {
   const Clamped clamped = as_clamped(healthy, of_healthy, declared);
-  DifferentialRecord result{.record = now, .lines = clamped.lines, .healthy = clamped.machine};
+  DifferentialRecord result{.record = now, .noise = clamped.noise, .healthy = clamped.machine};
   const Prediction predicted = of_healthy.predict(result.healthy);
   const std::vector<ComparedChannel>& channels = of_healthy.channels();
   std::size_t fewest = 0, unmatched = 0;

@@ -15,7 +15,7 @@
 
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
-#include "diagnosis/search/noise_audit.hpp"
+#include "diagnosis/search/unrest.hpp"
 #include "model/axes.hpp"
 #include "model/machine.hpp"
 
@@ -25,7 +25,7 @@ struct DifferentialRecord {
   Record record;
   double noise_scale = 1;  ///< of the standard deviation
   PerAxis<double> off{};  ///< RMS of a reading of the probe less yhat in the healthy run, x y z [m]
-  std::vector<NoiseLine> lines;  ///< what vibrates in the healthy run
+  HealthyNoise noise;
   Machine healthy;  ///< what the record is held against instead of the declared machine
 };
 

@@ -9,6 +9,8 @@ namespace vcnc {
 namespace {
 
 constexpr double kNormal95 = 1.96;
+/// Of the noise's chi-square: a form that leaves less in every channel makes no model inexact.
+constexpr double kExactForm = 0.01;
 /// What the scatter of few conditions misses of the variance between them.
 constexpr double kFewConditions = 1.3;
 constexpr double kFewLaps = 4;  ///< whose scatter tells nothing
@@ -48,6 +50,14 @@ Eigen::VectorXd scatter(const Eigen::MatrixXd& inverse,
 }
 
 }  // namespace
+
+bool is_inexact(const Evidence& evidence, const DiagnosisOptions& options, double floor,
+                double held_out) {
+  const std::vector<double>& form = options.form_of_channel;
+  for (std::size_t c = 0; c < form.size(); ++c)
+    if (form[c] > kExactForm * evidence.count(c, Role::held_out)) return true;
+  return held_out > options.model_form * floor;
+}
 
 std::map<std::string, Interval> intervals_of(const Evidence& evidence, const FittedMachine& machine,
                                              bool inexact) {

@@ -13,6 +13,7 @@
 #include <map>
 #include <string>
 
+#include "diagnosis/search/diagnosis_options.hpp"
 #include "diagnosis/search/fitted_machine.hpp"
 
 namespace vcnc {
@@ -20,6 +21,11 @@ namespace vcnc {
 struct Interval {
   double half_width = 0;  ///< of the 95 % interval, in the unit of the key
 };
+
+/// Whether a model is known to be more than noise off the machine, where it leaves `held_out` of a
+/// `floor` that noise leaves (chi-square).
+bool is_inexact(const Evidence& evidence, const DiagnosisOptions& options, double floor,
+                double held_out);
 
 /// By key, of nuisances and added effects; `inexact`: the model is known not to be exact.
 std::map<std::string, Interval> intervals_of(const Evidence& evidence, const FittedMachine& machine,

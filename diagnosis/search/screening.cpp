@@ -59,31 +59,6 @@ bool possible(const Candidate& candidate, const Trial& trial, const Eigen::Vecto
   return any;
 }
 
-constexpr double kDeviations = 5;  ///< of a number that is seen at all
-
-/// Steps at which as much gain counts as is needed, from the gain of one step in each channel.
-double steps_to(const std::vector<double>& per_step, const Needed& needed) {
-  const auto counts = [&](double squared) {
-    double sum = 0;
-    for (std::size_t c = 0; c < per_step.size(); ++c)
-      sum += std::max(0.0, per_step[c] * squared - (needed.doubt.empty() ? 0 : needed.doubt[c]));
-    return sum;
-  };
-  double low = 1e-24, high = 1e24;
-  if (counts(high) < needed.counted_gain) return std::numeric_limits<double>::infinity();
-  while (high / low > 1.0001) {
-    const double middle = std::sqrt(low * high);
-    (counts(middle) < needed.counted_gain ? low : high) = middle;
-  }
-  return std::sqrt(high);
-}
-
-/// Steps at which one consequence at least is what is needed.
-double steps_to(const Consequence& per_step, const Consequence& needed) {
-  return std::min(needed.contour_um / per_step.contour_um,
-                  needed.of_noise_but_readings / per_step.of_noise_but_readings);
-}
-
 }  // namespace
 
 std::vector<TrialColumns> simulate_trials(const Evidence& evidence, const Machine& base,
@@ -179,63 +154,6 @@ Ground::Ground(const Evidence& evidence, const Column& residual, const LinearPar
   fitted = at.fitted;
   held_out = at.held_out;
   held_out_of = left_after(grams.held_out_of, at.step);
-}
-
-void find_detection_limits(const Evidence& evidence, const Ground& ground, const Needed& needed,
-                           std::vector<TrialColumns>& trials) {
-  const Eigen::Index n = ground.precision.size();
-  Eigen::MatrixXd a = (ground.grams.fitted + ground.grams.held_out).block(1, 1, n, n);
-  a.diagonal() += ground.precision;
-  a.diagonal().array() += 1e-10 * (1e-6 + a.diagonal().array());
-  const Eigen::LDLT<Eigen::MatrixXd> factor(a);
-  parallel_for(trials.size(), [&](std::size_t i) {
-    TrialColumns& t = trials[i];
-    t.ground.learn(evidence, ground.columns, t.columns);
-    const RoleGrams& across = t.ground.products();
-    constexpr double kNever = std::numeric_limits<double>::infinity();
-    double steps = kNever;  // of the best direction
-    for (std::size_t d = 0; d < t.columns.size(); ++d) {
-      const auto at = static_cast<Eigen::Index>(d);
-      const double all = t.own.fitted(at, at) + t.own.held_out(at, at);
-      const Eigen::VectorXd nc = (across.fitted + across.held_out).block(1, at, n, 1);
-      const Eigen::VectorXd others = n > 0 ? Eigen::VectorXd(factor.solve(nc)) : nc;
-      const double left = all - nc.dot(others);
-      // What is left of a column that the others can make up is rounding.
-      if (!(left > 1e-6 * all)) continue;
-      std::vector<double> per_step;  // gain in each channel
-      for (std::size_t c = 0; c < across.held_out_of.size(); ++c)
-        per_step.push_back(t.own.held_out_of[c](at, at) -
-                           2 * others.dot(across.held_out_of[c].block(1, at, n, 1).col(0)) +
-                           others.dot(ground.grams.held_out_of[c].block(1, 1, n, n) * others));
-      steps = std::min(steps, std::max({kDeviations / std::sqrt(left), steps_to(per_step, needed),
-                                        steps_to(t.consequence[d], needed.consequence)}));
-    }
-    const Direction& first = t.trial.directions.front();
-    if (first.whole)
-      t.detection_limit = steps <= 1 ? std::abs(t.trial.values[first.number] + first.step) : kNever;
-    else
-      t.detection_limit = steps * std::abs(first.step);
-  });
-}
-
-std::vector<double> release_limits(const Ground& ground, const std::vector<FreedNumber>& numbers,
-                                   double pull, double gain) {
-  const Eigen::Index n = ground.precision.size();
-  Eigen::MatrixXd a = (ground.grams.fitted + ground.grams.held_out).block(1, 1, n, n);
-  a.diagonal() += ground.precision;
-  a.diagonal().array() += 1e-10 * (1e-6 + a.diagonal().array());
-  const Eigen::MatrixXd inverse = a.ldlt().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
-  std::vector<double> limits(numbers.size(), std::numeric_limits<double>::infinity());
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const auto at = static_cast<Eigen::Index>(i);
-    const double prior = ground.precision[at], information = 1 / inverse(at, at) - prior;
-    if (prior <= 0 || information <= 1e-6 * prior) continue;
-    // What data and tolerance agree on is information / (information + prior) of the change.
-    const double pulled = pull / std::sqrt(prior) * (information + prior) / information;
-    const double gained = std::sqrt(gain * (1 / prior + 1 / information));
-    limits[i] = std::max(pulled, gained) * numbers[i].number.typical;
-  }
-  return limits;
 }
 
 std::vector<Screened> screen(const Evidence& evidence, const Ground& ground, const Doubt& doubt,

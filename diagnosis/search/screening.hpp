@@ -3,10 +3,6 @@
 // Every direction of every trial is simulated once from a base machine. Its whitened columns C and
 // those of the numbers that go along, N, are fitted to the residual of the fitted laps together;
 // what that leaves on the held-out laps against N alone is the gain of the candidate.
-//
-// A detection limit is the size of a direction from which on it would be told: five standard
-// deviations by the Cramer-Rao bound, N projected out, and what its counted gain (counted_gain.hpp)
-// and its consequence must reach to be accepted.
 #pragma once
 
 #include <functional>
@@ -42,7 +38,8 @@ struct TrialColumns {
   RoleGrams own;                         ///< products of the columns with each other
   RememberedProducts ground;
   /// Of its first number; where that is a limit, the limit itself if it would be seen.
-  double detection_limit = std::numeric_limits<double>::infinity();
+  double detection_limit = std::numeric_limits<double>::infinity();  ///< see detection_limits.hpp
+  std::size_t shows_first = 0;  ///< the direction that it is the limit of
 };
 
 struct Screened {
@@ -71,22 +68,6 @@ struct Ground {
   double fitted = 0, held_out = 0;  ///< chi-square with priors, the linear numbers fitted
   std::vector<double> held_out_of;  ///< of it per channel, without priors
 };
-
-/// What an effect must reach to be told.
-struct Needed {
-  double counted_gain = 25;
-  Doubt doubt;
-  Consequence consequence;
-};
-
-/// Fills in the detection limits.
-void find_detection_limits(const Evidence& evidence, const Ground& ground, const Needed& needed,
-                           std::vector<TrialColumns>& trials);
-
-/// Changes of declared numbers from which on they would be told, in the unit of the key: what takes
-/// them `pull` tolerances away and gains `gain`. Infinity for those without a tolerance.
-std::vector<double> release_limits(const Ground& ground, const std::vector<FreedNumber>& numbers,
-                                   double pull, double gain);
 
 /// Gains of all trials on a residual, best first.
 std::vector<Screened> screen(const Evidence& evidence, const Ground& ground, const Doubt& doubt,

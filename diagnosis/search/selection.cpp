@@ -7,6 +7,7 @@
 #include <set>
 
 #include "diagnosis/search/contest.hpp"
+#include "diagnosis/search/detection_limits.hpp"
 #include "diagnosis/search/trial_values.hpp"
 #include "model/axes.hpp"
 
@@ -208,6 +209,9 @@ class Search {
                                      candidates_, all, [&](double s) { return go(doing, s); });
     const Ground ground(evidence_, result_.base.residual, result_.base.nuisances);
     find_detection_limits(evidence_, ground, needed(), result_.trials);
+    try_detection_limits(
+        evidence_, result_.base.machine, result_.base.prediction, candidates_, ground, needed(),
+        [&](double s) { return go("trying detection limits", s); }, result_.trials);
     at_base_ = result_.trials;
     result_.release_limits = release_limits(ground, result_.base.nuisances.numbers,
                                             options_.out_of_tolerance, options_.release_gain);

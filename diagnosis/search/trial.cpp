@@ -102,7 +102,7 @@ Machine machine_of(const Machine& base, const Candidate& candidate, const Trial&
   for (std::size_t i = 0; i < candidate.numbers.size(); ++i) {
     double value = trial.values[i];
     if (i == direction.number) value += direction.step;
-    if (i == phase && trial.directions.size() > 1 && direction.quadrature) value = 90;
+    if (i == phase && direction.quadrature) value = 90;
     move_number(machine, candidate.numbers[i].key, value);
   }
   return machine;

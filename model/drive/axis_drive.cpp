@@ -10,7 +10,6 @@ namespace {
 
 constexpr double kObserverRatio = 4;        // observer poles over velocity loop crossover
 constexpr double kFastestObserver = 5000;   // [rad/s], half of the loop rate
-constexpr double kContactResonance = 400;   // [Hz] of a gap without compliance
 constexpr double kLargestPlantAngle = 0.5;  // resonance [rad/s] times plant step
 constexpr double kStandingSpeed = 1e-3;     // [m/s or rad/s]
 
@@ -156,9 +155,9 @@ void AxisDriveOf<Real>::couple(const TransmissionPort::Signal<double>& transmiss
         "motor_inertia_kgm2: wind-up and backlash need a motor side of at least a thousandth of "
         "the load");
   const double reduced = load * motor / (load + motor);
-  double resonance = 2 * kPi * kContactResonance;
-  if (transmission.compliance > 0) resonance = std::sqrt(1 / (transmission.compliance * reduced));
-  resonance = std::min(resonance, kLargestPlantAngle / kPlantTime);
+  double resonance = kLargestPlantAngle / kPlantTime;
+  if (transmission.compliance > 0)
+    resonance = std::min(resonance, std::sqrt(1 / (transmission.compliance * reduced)));
   stiffness_ = resonance * resonance * reduced;
   damping_ = 2 * transmission.damping_ratio * resonance * reduced;
 }

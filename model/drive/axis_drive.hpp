@@ -26,7 +26,7 @@
 //   two masses:  m_r x_m'' = F - F_s,   m x'' = F_s - F_f(x')
 //                F_s = K g(x_m - x) + D (x_m' - x')
 //                g(z) = z -+ b/2 outside the gap b, 0 inside (D off inside)
-//   backlash without compliance: the same with a contact stiffness of 400 Hz resonance
+//   backlash without compliance: the same, the sides of the gap as stiff as K may be
 //
 // Integration: rigid exactly for a force constant over the step; two masses by the symplectic Euler
 // rule, with K limited to a resonance of 1.6 kHz (10 kN then wind the spring up by less than
@@ -175,9 +175,11 @@ class AxisDriveOf {
   Cycle hold();
 
   /// Whether what it does while its set-point stands depends on nothing but its own state and, at
-  /// the tool centre, on slow functions of time: then a drive that has come to rest stays so.
+  /// the tool centre, on slow functions of time: then a drive that has come to rest stays so. One
+  /// with a gap may begin to hunt.
   bool can_rest() const {
-    return !laws_ && !sampled_ && !reception_.some_active() && !shaping_.some_active();
+    return !laws_ && !sampled_ && !reception_.some_active() && !shaping_.some_active() &&
+           all(half_gap_ == Real(0));
   }
   /// A cycle at rest: nothing changes but the time.
   void rest() { ++cycle_; }

@@ -173,7 +173,7 @@ def text_of(value):
     return "[" + ", ".join(f"{v:.9g}" for v in value) + "]" if isinstance(value, list) else f"{value:.9g}"
 
 
-def own_run(vcnc, work, s):
+def own_run(vcnc, work, s, per_shift):
     """One machine: run, diagnosed, graded."""
     folder = work / f"own_{s['number']}"
     command = [vcnc, "run", str(work / "program.ngc"), "--machine", str(work / "own.toml"), "--in-process", "--no-report",
@@ -187,7 +187,7 @@ def own_run(vcnc, work, s):
     row = diagnose(vcnc, s, [str(folder), "--model", str(work / "own.toml"), *extra], work / f"own_{s['number']}_found")
     shutil.rmtree(folder)
     if s["kind"] == "single" and "failed" not in row:
-        transfer(vcnc, work, s, row)
+        transfer(vcnc, work, s, row, per_shift)
     return row
 
 
@@ -202,7 +202,8 @@ def own_part(vcnc, work, seed, counts, jobs):
     for s in drawn:
         number = s["number"]
         print(f"own answer_{number} {files.write_answer(work / f'own_answer_{number}.json', s)}", flush=True)
-    return pooled(jobs, lambda s: own_run(vcnc, work, s), drawn)
+    per_shift = readings_per_shift(vcnc, work)
+    return pooled(jobs, lambda s: own_run(vcnc, work, s, per_shift), drawn)
 
 
 def contour_readings(vcnc, work, name, machine_file, assignments):
@@ -222,23 +223,44 @@ def contour_readings(vcnc, work, name, machine_file, assignments):
     return np.where(size > 0.3e-3, size, np.nan)
 
 
-def transfer(vcnc, work, s, row):
+QUIET = {"effects.probe.adc_noise.noise_mV": 0} | {
+    f"effects.{axis}.encoder_quantisation.quantum_{'arcsec' if rotary else 'nm'}": 0
+    for axis, rotary in zip(machine.AXES, files.ROTARY)}
+
+
+def clamped_at(shift_um):
+    return {"effects.setup.piece_offset.shift_um": shift_um, "effects.setup.piece_tilt.tilt_urad": [0.0, 0.0, 0.0]}
+
+
+def readings_per_shift(vcnc, work):
+    """What the reading on the S piece changes by per micrometre that it is clamped elsewhere in x, y and z; (ticks, 3)."""
+    at = [contour_readings(vcnc, work, f"clamped_{i}", work / "own.toml", clamped_at([10.0 * (i == j) for j in range(3)]) | QUIET)
+          for i in range(4)]
+    n = min(map(len, at))
+    return np.stack([(a[:n] - at[3][:n]) / 10 for a in at[:3]], axis=1)
+
+
+def left_where_clamped_best(difference, per_shift):
+    """RMS of a difference of readings once a shift of the piece has been fitted, as whoever clamps it anew does."""
+    n = min(len(difference), len(per_shift))
+    known = np.isfinite(difference[:n]) & np.all(np.isfinite(per_shift[:n]), axis=1)
+    d, c = difference[:n][known], per_shift[:n][known]
+    return float(np.sqrt(np.mean((d - c @ np.linalg.lstsq(c, d, rcond=None)[0]) ** 2)))
+
+
+def transfer(vcnc, work, s, row, per_shift):
     """What the model found on circles and lines leaves of the S piece's error, as a share of what the declared model
     leaves: both against the true machine, another piece being clamped."""
     if row.get("strength", 0) < 3 or not row["top"] or s["effects"][0]["name"] in ("period_slip", "contact_loss"):
         return
     truth = {k: v for k, v in s["assignments"].items() if not k.startswith("effects.setup.")}
-    quiet = {"effects.probe.adc_noise.noise_mV": 0}
-    for axis, rotary in zip(machine.AXES, files.ROTARY):
-        quiet[f"effects.{axis}.encoder_quantisation.quantum_{'arcsec' if rotary else 'nm'}"] = 0
     name = f"transfer_{s['number']}"
-    true = contour_readings(vcnc, work, name, work / "own.toml", truth | quiet)
+    true = contour_readings(vcnc, work, name, work / "own.toml", truth | QUIET)
     left = []
-    clamped_otherwise = {"effects.setup.piece_offset.shift_um": [0, 0, 0], "effects.setup.piece_tilt.tilt_urad": [0, 0, 0]}
     for model in (work / "own.toml", work / f"own_{s['number']}_found" / MODEL):
-        other = contour_readings(vcnc, work, name, model, clamped_otherwise | quiet)
+        other = contour_readings(vcnc, work, name, model, clamped_at([0.0, 0.0, 0.0]) | QUIET)
         n = min(len(true), len(other))
-        left.append(float(np.sqrt(np.nanmean((true[:n] - other[:n]) ** 2))))
+        left.append(left_where_clamped_best(true[:n] - other[:n], per_shift))
     row["transfer"] = left[1] / left[0]
 
 

@@ -92,12 +92,64 @@ TEST(ChatterSearch, WhatVibratedBeforeIsNoNews) {
   VibratingReplica replica(now), of_healthy(healthy);
   const Machine declared;
   const DifferentialRecord difference = less_healthy(now, healthy, of_healthy, declared);
-  EXPECT_FALSE(difference.lines.empty());
+  EXPECT_FALSE(difference.noise.lines.empty());
   const Diagnosis d = diagnose({now, replica, declared, drive_candidates()}, difference);
   EXPECT_TRUE(d.effects.empty());
   EXPECT_TRUE(std::none_of(d.notes.begin(), d.notes.end(), [](const std::string& n) {
     return n.find("by itself") != std::string::npos;
   }));
+}
+
+/// The toy machine, whose X rattles over all frequencies as soon as it has play.
+class RattlingReplica : public toy::ToyReplica {
+ public:
+  using ToyReplica::ToyReplica;
+  Prediction predict(const Machine& m) const override {
+    const Prediction quiet = ToyReplica::predict(m);
+    std::vector<std::vector<double>> all(quiet.begin(), quiet.end());
+    const double width = m.effects.axis[0].get<LoadPlay>().width;
+    for (std::size_t k = 0; width > 1e-6 && k < all[0].size(); ++k) {
+      all[0][k] += 0.05 * width * gaussian_noise(77, 0, k)[0];
+      all[1][k] += 5e6 * width * gaussian_noise(77, 1, k)[0];
+    }
+    return {all.begin(), all.end()};
+  }
+};
+
+TEST(ChatterSearch, NamesWhatMakesLapsDifferAsMuchAsTheyDo) {
+  const auto measured = [](double width_um, std::uint64_t seed) {
+    Record record = toy::commands(1000, 4);
+    Machine truth;
+    move_number(truth, "effects.X.load_play.width_um", width_um);
+    const Prediction all = RattlingReplica(record).predict(truth);
+    toy::measure(record, {}, seed);
+    for (MeasuredSignal& s : record.signals) {
+      const std::size_t c = s.kind == SignalKind::position ? 0 : 1;
+      if (s.kind != SignalKind::position && s.kind != SignalKind::force) continue;
+      const Prediction still = toy::ToyReplica(record).predict(truth);
+      for (std::size_t k = 0; k < s.value.size(); ++k) s.value[k] += all[c][k] - still[c][k];
+    }
+    return record;
+  };
+  const Record healthy = measured(0, 6);
+  RattlingReplica of_healthy(healthy);
+  const auto diagnosed = [&](const Record& now) {
+    RattlingReplica replica(now);
+    return diagnose({now, replica, {}, drive_candidates()},
+                    less_healthy(now, healthy, of_healthy, {}));
+  };
+  const Diagnosis d = diagnosed(measured(8, 7));
+  ASSERT_EQ(d.effects.size(), 1U);
+  EXPECT_EQ(d.effects[0].name, "load_play");
+  EXPECT_LT(d.effects[0].numbers[0].low, 8);
+  EXPECT_GT(d.effects[0].numbers[0].high, 8);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
+  EXPECT_TRUE(diagnosed(measured(0, 8)).effects.empty());
+  // No size that is tried rattles as much as this: the drive is told to be restless, no more.
+  const Diagnosis more = diagnosed(measured(800, 9));
+  EXPECT_TRUE(more.effects.empty());
+  ASSERT_FALSE(more.notes.empty());
+  EXPECT_EQ(more.notes[0].find("X is restless"), 0U) << more.notes[0];
 }
 
 TEST(ChatterSearch, AQuietMachineIsNotSimulated) {

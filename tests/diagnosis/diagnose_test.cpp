@@ -335,6 +335,35 @@ TEST(Diagnose, ReferenceRunCancelsWhatTheModelGetsWrong) {
   EXPECT_EQ(none.verdict, DiagnosisVerdict::no_deviation);
 }
 
+TEST(Diagnose, BetweenTwoRunsTellsNothingThatExplainsLessThanATenthOfWhatIsLeft) {
+  // A wave that is a law of nothing, and a squareness of a twentieth of its chi-square.
+  const auto seen_with = [](double wave_um, std::uint64_t seed) {
+    Machine truth;
+    move_number(truth, "effects.geometry.squareness.xy_urad", 9);
+    Record record = measured(truth, seed);
+    for (MeasuredSignal& s : record.signals)
+      if (s.kind == SignalKind::deflection)
+        for (std::size_t k = 0; k < s.value.size(); ++k)
+          s.value[k] +=
+              1e-6 * wave_um * std::sin(2 * kPi * 27 * static_cast<double>(k % 1000) / 1000);
+    return record;
+  };
+  const Record healthy = measured({}, 51);
+  toy::ToyReplica of_healthy(healthy);
+  const auto names_squareness = [](const Diagnosis& d) {
+    return std::any_of(d.effects.begin(), d.effects.end(),
+                       [](const FoundEffect& e) { return e.name == "squareness"; });
+  };
+  for (const double wave_um : {0.2, 1.0}) {
+    const Record sick = seen_with(wave_um, 52);
+    toy::ToyReplica of_sick(sick);
+    const Diagnosis d = diagnose({sick, of_sick, {}, toy::candidates()},
+                                 less_healthy(sick, healthy, of_healthy, {}));
+    EXPECT_EQ(names_squareness(d), wave_um == 0.2);
+    EXPECT_TRUE(names_squareness(diagnosed(sick))) << wave_um;  // against the declared machine
+  }
+}
+
 TEST(LessHealthy, HoldsAgainstThePieceAsItWasClamped) {
   Machine clamped;
   move_number(clamped, "effects.setup.piece_offset.shift_um.x", 15);

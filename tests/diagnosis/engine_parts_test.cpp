@@ -1,4 +1,4 @@
-// The parts of the engine against closed forms: filters, solver, partition, limits, intervals.
+// The parts of the engine against closed forms: filters, solver, partition, thresholds, intervals.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -228,52 +228,6 @@ TEST(Threshold, WhatDoesNotStandOutOfTheLapsIsNotTold) {
   EXPECT_FALSE(rules.stands_out({n, n, n}, {n - 1000, n, n}));
   EXPECT_FALSE(rules.stands_out({n, 3 * n, n}, {n - 1000, 3 * n, n}));
   EXPECT_TRUE(rules.stands_out({n, n, n}, {n - 100, n, n}));  // less than chance makes
-}
-
-TEST(Screening, DetectionLimitIsWhereTheHeldOutHalfGainsEnough) {
-  Record record = toy::commands(1000, 4);
-  toy::measure(record, Machine(), 2);
-  toy::ToyReplica replica(record);
-  Evidence evidence(record, replica, Machine());
-  const std::vector<Candidate> all = toy::candidates();
-  DiagnosisOptions options;
-  options.least_contour_um = options.least_of_noise = 0;  // whatever the consequence
-  const SelectionResult result = select_effects_of(evidence, Machine(), all, options, {});
-  // command_delay: e = -t v in the position with 50 nm of noise, and -t v at the probe with 100 nm.
-  double sum = 0;
-  const std::vector<double>& x = record.find(SignalKind::command, 0)->value;
-  for (std::size_t k = 1; k + 1 < x.size(); ++k) {
-    const double v = (x[k + 1] - x[k - 1]) / 2e-3, a = (x[k + 1] - 2 * x[k] + x[k - 1]) / 1e-6;
-    if (std::abs(a) > 100) continue;
-    sum += v * v * (1 / std::pow(toy::kPositionNoise, 2) + 1 / std::pow(toy::kProbeNoise, 2));
-  }
-  const double limit = 5 / std::sqrt(sum / 2) * 1e3;  // a gain of 25 on half of the laps
-  EXPECT_NEAR(result.trials.front().detection_limit, limit, 0.05 * limit);
-
-  // Of the part at the probe nothing counts below a gain of 100, of the position all does.
-  double position = 0;
-  for (std::size_t k = 1; k + 1 < x.size(); ++k) {
-    const double v = (x[k + 1] - x[k - 1]) / 2e-3, a = (x[k + 1] - 2 * x[k] + x[k - 1]) / 1e-6;
-    if (std::abs(a) < 100) position += v * v / std::pow(toy::kPositionNoise, 2);
-  }
-  options.form_of_channel = {0, 0, 200};
-  const SelectionResult doubted = select_effects_of(evidence, Machine(), all, options, {});
-  EXPECT_NEAR(doubted.trials.front().detection_limit, 5 / std::sqrt(position / 2) * 1e3,
-              0.05 * limit);
-}
-
-TEST(Screening, ADeclaredNumberIsToldWhereItLeavesItsToleranceForCertain) {
-  Record record = toy::commands(1000, 4);
-  toy::measure(record, Machine(), 2);
-  toy::ToyReplica replica(record);
-  Evidence evidence(record, replica, Machine());
-  const SelectionResult result = select_effects_of(evidence, Machine(), toy::candidates(), {}, {});
-  // The force tells the mass far better than its tolerance of 1 %: a gain of 25 are 5 tolerances.
-  double mass = 0;
-  for (std::size_t i = 0; i < result.release_limits.size(); ++i)
-    if (result.base.nuisances.numbers[i].number.key == "axes.X.load_kg")
-      mass = result.release_limits[i];
-  EXPECT_NEAR(mass, 5 * 5, 0.1);
 }
 
 TEST(TrialValues, FrequenciesAreThoseTheReadingsRingWith) {

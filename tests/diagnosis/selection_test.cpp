@@ -202,6 +202,56 @@ TEST(Selection, StandInsForEachOtherAllGo) {
   EXPECT_NEAR(number_of(result.found.machine, "effects.Y.load_play.width_um"), 1, 0.02);
 }
 
+/// A drive with friction and play: without friction play rattles, which is a wave that no lap
+/// repeats, with friction it is the fourth wave of a lap.
+class RattlingReplica : public Replica {
+ public:
+  static constexpr const char* kFriction = "effects.X.coulomb.level_N";
+  static constexpr const char* kPlay = "effects.X.backlash.gap_um";
+
+  explicit RattlingReplica(std::size_t samples) : samples_(samples) {}
+
+  const std::vector<ComparedChannel>& channels() const override { return channels_; }
+  Prediction predict(const Machine& m) const override {
+    const double friction = number_of(m, kFriction), play = number_of(m, kPlay);
+    const double waves = friction > 0.1 ? 4 : 71.37;
+    std::vector<double> x(samples_);
+    for (std::size_t k = 0; k < samples_; ++k) {
+      const double lap = 2 * kPi * static_cast<double>(k) / 1000;
+      x[k] = 1e-6 * (friction * std::sin(3 * lap) + play * std::sin(waves * lap));
+    }
+    return {x};
+  }
+  static std::vector<Candidate> candidates() {
+    std::vector<Candidate> all;
+    for (const char* key : {kFriction, kPlay})
+      all.push_back({key, "X", {{key, 1, 0, 1000, true}}, {}, Family::mechanics});
+    return all;
+  }
+
+ private:
+  std::size_t samples_;
+  std::vector<ComparedChannel> channels_{{SignalKind::deflection, 0}};
+};
+
+TEST(Selection, LooksAgainAtADriveAtWhichSomethingWasFound) {
+  Record record = toy::commands(1000, 4);
+  RattlingReplica replica(record.samples());
+  Machine truth;
+  move_number(truth, RattlingReplica::kFriction, 2);
+  move_number(truth, RattlingReplica::kPlay, 0.5);
+  std::vector<double> reading = replica.predict(truth)[0];
+  for (std::size_t k = 0; k < reading.size(); ++k)
+    reading[k] += toy::kProbeNoise * gaussian_noise(16, 0, k)[0];
+  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+  Evidence evidence(record, replica, {});
+  const SelectionResult result =
+      select_effects_of(evidence, {}, RattlingReplica::candidates(), {}, {});
+  ASSERT_EQ(result.found.added.size(), 2U);
+  EXPECT_NEAR(number_of(result.found.machine, RattlingReplica::kFriction), 2, 0.02);
+  EXPECT_NEAR(number_of(result.found.machine, RattlingReplica::kPlay), 0.5, 0.02);
+}
+
 TEST(Selection, ManyThatDoALittleEachAreNotTold) {
   const std::vector<const char*> keys{"effects.X.load_play.width_um",
                                       "effects.Y.load_play.width_um",

@@ -166,7 +166,7 @@ TEST(AxisDrive, BacklashIsLostMotionWithMotorFeedback) {
   AxisEffects effects = friction();
   effects.get<Backlash>().gap = 10 * kUm;
   const Reversal r = reversal(axis(40, 1, 1), effects);
-  EXPECT_NEAR(r.lost_motion, 10 * kUm, 0.3 * kUm);  // 250 N on the contact stiffness: 0.1 um a side
+  EXPECT_NEAR(r.lost_motion, 10 * kUm, 0.3 * kUm);
   EXPECT_NEAR(r.error_home - r.error_out, 10 * kUm, 0.5 * kUm);
 }
 

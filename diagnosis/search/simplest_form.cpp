@@ -1,0 +1,147 @@
+#include "diagnosis/search/simplest_form.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "diagnosis/search/consequence.hpp"
+#include "diagnosis/search/intervals.hpp"
+#include "diagnosis/search/trial.hpp"
+
+namespace vcnc {
+namespace {
+
+/// Of the noise of a sample: two machines that differ by less are the same.
+constexpr double kSameMachine = 1e-3;
+/// A number that costs less chi-square to be as declared is put back: this much, or this part of
+/// what an effect must gain.
+constexpr double kUnneeded = 4, kUnneededPart = 0.25;
+
+/// Whether a number only shapes its effect.
+bool is_shape(const Candidate& candidate, const FreedNumber& n) {
+  return std::any_of(candidate.shape.begin(), candidate.shape.end(),
+                     [&](std::size_t s) { return candidate.numbers[s].key == n.number.key; });
+}
+
+/// Indices of the numbers that say how much of the effect there is.
+std::vector<std::size_t> amplitudes_of(const Candidate& candidate, const AddedEffect& effect) {
+  std::vector<std::size_t> all;
+  for (std::size_t i = 0; i < effect.numbers.size(); ++i)
+    if (!is_shape(candidate, effect.numbers[i])) all.push_back(i);
+  return all;
+}
+
+/// A number of an added effect leaves the fit, and its column with it.
+void forget(FittedMachine& m, std::size_t effect, std::size_t number) {
+  std::size_t column = number;
+  for (std::size_t e = 0; e < effect; ++e) column += m.added[e].numbers.size();
+  std::vector<FreedNumber>& numbers = m.added[effect].numbers;
+  numbers.erase(numbers.begin() + static_cast<std::ptrdiff_t>(number));
+  if (column < m.columns.size())
+    m.columns.erase(m.columns.begin() + static_cast<std::ptrdiff_t>(column));
+}
+
+void put_back_unneeded(const Evidence& evidence, const Machine& declared,
+                       const std::vector<Candidate>& candidates, double least_cost,
+                       FittedMachine& m) {
+  for (std::size_t e = 0; e < m.added.size(); ++e) {
+    const Candidate& candidate = candidates[m.added[e].candidate];
+    while (true) {
+      const std::vector<std::size_t> amplitudes = amplitudes_of(candidate, m.added[e]);
+      if (amplitudes.size() < 2) break;
+      const double chi2 = evidence.chi2(m.residual, Role::both);
+      double least = least_cost;
+      std::size_t which = m.added[e].numbers.size();
+      Machine without;
+      for (const std::size_t i : amplitudes) {
+        Machine less = m.machine;
+        const std::string& key = m.added[e].numbers[i].number.key;
+        move_number(less, key, number_of(declared, key));
+        const double cost =
+            evidence.chi2(evidence.residual(evidence.predict(less)), Role::both) - chi2;
+        if (cost < least) least = cost, which = i, without = std::move(less);
+      }
+      if (which == m.added[e].numbers.size()) break;
+      forget(m, e, which);
+      m.machine = std::move(without);
+      m.prediction = evidence.predict(m.machine);
+      m.residual = evidence.residual(m.prediction);
+    }
+  }
+}
+
+void put_back_undetermined(const Evidence& evidence, const Machine& declared,
+                           const std::vector<Candidate>& candidates,
+                           const DiagnosisOptions& options, double floor, FittedMachine& m) {
+  while (true) {
+    const std::map<std::string, Interval> intervals =
+        intervals_of(evidence, m, is_inexact(evidence, options, floor, m.held_out));
+    double least = 1;
+    std::size_t effect = m.added.size(), number = 0;
+    for (std::size_t e = 0; e < m.added.size(); ++e) {
+      const std::vector<std::size_t> amplitudes =
+          amplitudes_of(candidates[m.added[e].candidate], m.added[e]);
+      if (amplitudes.size() < 2) continue;
+      for (const std::size_t i : amplitudes) {
+        const FreedNumber& n = m.added[e].numbers[i];
+        const auto known = intervals.find(n.number.key);
+        if (known == intervals.end()) continue;
+        const double off = std::abs(n.value - number_of(declared, n.number.key)),
+                     certain = off / std::max(known->second.half_width, 1e-300);
+        if (certain < least) least = certain, effect = e, number = i;
+      }
+    }
+    if (effect == m.added.size()) return;
+    const std::string key = m.added[effect].numbers[number].number.key;
+    FittedMachine less = m;
+    forget(less, effect, number);
+    move_number(less.machine, key, number_of(declared, key));
+    converge(evidence, less);
+    if (less.held_out > m.held_out + options.least_gain) return;
+    m = std::move(less);
+  }
+}
+
+/// The numbers of a wave with all amplitudes turned, and the phase by half a period.
+std::vector<FreedNumber> turned(std::vector<FreedNumber> numbers, std::size_t phase) {
+  for (FreedNumber& n : numbers)
+    if (!n.shape && !is_phase(n.number) && !has_no_phase(n.number)) n.value = -n.value;
+  numbers[phase].value = std::remainder(numbers[phase].value + 180, 360);
+  return numbers;
+}
+
+void prefer_positive(const Evidence& evidence, FittedMachine& m) {
+  for (AddedEffect& a : m.added) {
+    std::vector<FreedNumber>& numbers = a.numbers;
+    const auto of_wave = std::find_if(numbers.begin(), numbers.end(),
+                                      [](const FreedNumber& n) { return is_phase(n.number); });
+    if (of_wave == numbers.end()) continue;
+    of_wave->value = std::remainder(of_wave->value, 360);
+    const auto amplitude = std::find_if(numbers.begin(), numbers.end(), [](const FreedNumber& n) {
+      return !n.shape && !is_phase(n.number) && !has_no_phase(n.number);
+    });
+    if (amplitude != numbers.end() && amplitude->value < 0) {
+      std::vector<FreedNumber> other =
+          turned(numbers, static_cast<std::size_t>(of_wave - numbers.begin()));
+      const Prediction same = evidence.predict(with(m.machine, other));
+      if (consequence(evidence, same, m.prediction).of_noise < kSameMachine)
+        numbers = std::move(other);
+    }
+    m.machine = with(m.machine, numbers);
+  }
+}
+
+}  // namespace
+
+void bring_to_simplest_form(const Evidence& evidence, const Machine& declared,
+                            const std::vector<Candidate>& candidates,
+                            const DiagnosisOptions& options, double floor, FittedMachine& machine) {
+  put_back_unneeded(evidence, declared, candidates,
+                    std::max(kUnneeded, kUnneededPart * options.least_gain), machine);
+  put_back_undetermined(evidence, declared, candidates, options, floor, machine);
+  prefer_positive(evidence, machine);
+}
+
+}  // namespace vcnc

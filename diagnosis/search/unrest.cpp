@@ -1,0 +1,81 @@
+#include "diagnosis/search/unrest.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vcnc {
+namespace {
+
+constexpr double kStands = 0.1;        // [s] from when on
+constexpr double kMean = 0.021;        // [s]
+constexpr std::size_t kEnough = 1000;  // samples
+
+/// RMS of a signal of an axis less its moving mean while the axis has stood for a while.
+double at_rest(const Record& record, std::size_t axis, const std::vector<double>& series) {
+  const MeasuredSignal* command = record.find(SignalKind::command, axis);
+  if (!command) return 0;
+  const std::vector<double>& q = command->value;
+  const auto before = static_cast<std::size_t>(kStands / record.period),
+             reach = static_cast<std::size_t>(std::max(1.0, 0.5 * kMean / record.period));
+  const auto width = static_cast<double>(2 * reach + 1);
+  double squares = 0, count = 0, sum = 0;
+  std::size_t stood = 0, known = 0;  // samples so far, up to the end of the window
+  for (std::size_t k = 0; k < series.size(); ++k) {
+    stood = k > 0 && q[k] == q[k - 1] ? stood + 1 : 0;
+    const bool good = std::isfinite(series[k]);
+    sum = good ? sum + series[k] : 0;
+    known = good ? known + 1 : 0;
+    if (known > 2 * reach + 1) sum -= series[k - 2 * reach - 1];
+    if (known < 2 * reach + 1 || stood < before) continue;
+    const double off = series[k - reach] - sum / width;
+    squares += off * off;
+    count += 1;
+  }
+  return count < static_cast<double>(kEnough) ? 0 : std::sqrt(squares / count);
+}
+
+/// What laps of a signal differ by while the axis is told to move.
+double in_motion(const Evidence& evidence, std::size_t axis, std::vector<double> series) {
+  const MeasuredSignal* command = evidence.record().find(SignalKind::command, axis);
+  if (!command) return 0;
+  const std::vector<double>& q = command->value;
+  for (std::size_t k = 0; k < series.size(); ++k)
+    if (k == 0 || q[k] == q[k - 1]) series[k] = kMissing;
+  return lap_scatter(evidence.partition(), series);
+}
+
+/// Of series that are found by their channel.
+template <class Series>
+std::vector<Unrest> unrest_of(const Evidence& evidence, Series&& series_of) {
+  const std::vector<ComparedChannel>& channels = evidence.replica().channels();
+  std::vector<Unrest> all;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    const std::size_t axis = channels[c].axis;
+    if (!is_of_drive(channels[c], axis)) continue;
+    const std::vector<double>& series = series_of(c);
+    all.push_back({channels[c], false, in_motion(evidence, axis, series)});
+    all.push_back({channels[c], true, at_rest(evidence.record(), axis, series)});
+  }
+  return all;
+}
+
+}  // namespace
+
+bool is_of_drive(const ComparedChannel& channel, std::size_t axis) {
+  return channel.axis == axis &&
+         (channel.kind == SignalKind::position || channel.kind == SignalKind::force);
+}
+
+std::vector<Unrest> unrest_of(const Evidence& evidence) {
+  return unrest_of(evidence, [&](std::size_t c) -> const std::vector<double>& {
+    const ComparedChannel& channel = evidence.replica().channels()[c];
+    return evidence.record().find(channel.kind, channel.axis)->value;
+  });
+}
+
+std::vector<Unrest> unrest_of(const Evidence& evidence, const Prediction& prediction) {
+  return unrest_of(evidence,
+                   [&](std::size_t c) -> const std::vector<double>& { return prediction[c]; });
+}
+
+}  // namespace vcnc

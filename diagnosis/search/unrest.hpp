@@ -1,0 +1,38 @@
+// How restless the drive of an axis is: what its signals do that nobody asked for.
+//
+//   in motion   what laps of one condition differ by while the axis is told to move, RMS
+//   at rest     what is left of a signal less its moving mean over 21 ms while the axis has been
+//   told to
+//               stand for 0.1 s, RMS: a drive that hunts within a gap does so for as long as it
+//               stands
+//
+// Validity: an axis of which the position or the force is recorded; a vibration faster than half
+// the rate of the record shows by its strength only.
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/search/evidence.hpp"
+
+namespace vcnc {
+
+struct Unrest {
+  ComparedChannel channel;
+  bool at_rest = false;
+  double rms = 0;  ///< [SI]; 0: not known
+};
+
+/// What was noise when the machine was healthy.
+struct HealthyNoise {
+  std::vector<NoiseLine> lines;
+  std::vector<Unrest> unrest;
+};
+
+bool is_of_drive(const ComparedChannel& channel, std::size_t axis);
+
+/// Of every position and force of a record.
+std::vector<Unrest> unrest_of(const Evidence& evidence);
+/// The same of a prediction, which has no noise.
+std::vector<Unrest> unrest_of(const Evidence& evidence, const Prediction& prediction);
+
+}  // namespace vcnc

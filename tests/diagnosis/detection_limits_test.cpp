@@ -1,0 +1,107 @@
+#include "diagnosis/search/detection_limits.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "diagnosis/search/selection.hpp"
+#include "toy_machine.hpp"
+
+namespace vcnc {
+namespace {
+
+TEST(DetectionLimit, IsWhereTheHeldOutHalfGainsEnough) {
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, Machine(), 2);
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, Machine());
+  const std::vector<Candidate> all = toy::candidates();
+  DiagnosisOptions options;
+  options.least_contour_um = options.least_of_noise = 0;  // whatever the consequence
+  const SelectionResult result = select_effects_of(evidence, Machine(), all, options, {});
+  // command_delay: e = -t v in the position with 50 nm of noise, and -t v at the probe with 100 nm.
+  double sum = 0;
+  const std::vector<double>& x = record.find(SignalKind::command, 0)->value;
+  for (std::size_t k = 1; k + 1 < x.size(); ++k) {
+    const double v = (x[k + 1] - x[k - 1]) / 2e-3, a = (x[k + 1] - 2 * x[k] + x[k - 1]) / 1e-6;
+    if (std::abs(a) > 100) continue;
+    sum += v * v * (1 / std::pow(toy::kPositionNoise, 2) + 1 / std::pow(toy::kProbeNoise, 2));
+  }
+  const double limit = 5 / std::sqrt(sum / 2) * 1e3;  // a gain of 25 on half of the laps
+  EXPECT_NEAR(result.trials.front().detection_limit, limit, 0.05 * limit);
+
+  // Of the part at the probe nothing counts below a gain of 100, of the position all does.
+  double position = 0;
+  for (std::size_t k = 1; k + 1 < x.size(); ++k) {
+    const double v = (x[k + 1] - x[k - 1]) / 2e-3, a = (x[k + 1] - 2 * x[k] + x[k - 1]) / 1e-6;
+    if (std::abs(a) < 100) position += v * v / std::pow(toy::kPositionNoise, 2);
+  }
+  options.form_of_channel = {0, 0, 200};
+  const SelectionResult doubted = select_effects_of(evidence, Machine(), all, options, {});
+  EXPECT_NEAR(doubted.trials.front().detection_limit, 5 / std::sqrt(position / 2) * 1e3,
+              0.05 * limit);
+}
+
+TEST(DetectionLimit, ADeclaredNumberIsToldWhereItLeavesItsToleranceForCertain) {
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, Machine(), 2);
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, Machine());
+  const SelectionResult result = select_effects_of(evidence, Machine(), toy::candidates(), {}, {});
+  // The force tells the mass far better than its tolerance of 1 %: a gain of 25 are 5 tolerances.
+  double mass = 0;
+  for (std::size_t i = 0; i < result.release_limits.size(); ++i)
+    if (result.base.nuisances.numbers[i].number.key == "axes.X.load_kg")
+      mass = result.release_limits[i];
+  EXPECT_NEAR(mass, 5 * 5, 0.1);
+}
+
+/// Play that does nothing up to a width, and beyond it what one of half the rest does.
+class PlayFrom : public toy::ToyReplica {
+ public:
+  PlayFrom(const Record& commands, double first_um)
+      : toy::ToyReplica(commands), first_(1e-6 * first_um) {}
+
+  Prediction predict(const Machine& m) const override {
+    Machine shown = m;
+    double& width = shown.effects.axis[0].get<LoadPlay>().width;
+    width = width > first_ ? 0.5 * (width + first_) : 0;
+    return toy::ToyReplica::predict(shown);
+  }
+
+ private:
+  double first_;
+};
+
+double limit_of(const SelectionResult& result, const char* effect) {
+  const std::vector<Candidate> all = toy::candidates();
+  for (const TrialColumns& t : result.trials)
+    if (all[t.trial.candidate].effect == effect) return t.detection_limit;
+  return 0;
+}
+
+TEST(DetectionLimit, OfAnEffectThatSmallSizesDoNotHaveIsWhereItBegins) {
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, Machine(), 2);
+  const auto limits = [&](Replica& replica) {
+    Evidence evidence(record, replica, Machine());
+    DiagnosisOptions options;
+    options.least_contour_um = 0.001, options.least_of_noise = 0;
+    const SelectionResult r =
+        select_effects_of(evidence, Machine(), toy::candidates(), options, {});
+    return std::pair{limit_of(r, "load_play"), limit_of(r, "squareness")};
+  };
+  toy::ToyReplica linear(record);
+  const auto [play, squareness] = limits(linear);
+  for (const double first_um : {0.1, 0.7, 3.0}) {
+    PlayFrom replica(record, first_um);
+    const auto [later, as_before] = limits(replica);
+    EXPECT_GE(later, first_um);
+    EXPECT_LE(later, 2 * first_um);
+    EXPECT_NEAR(as_before, squareness, 1e-9 * squareness);
+  }
+  EXPECT_LT(play, 0.05);  // where it is linear
+}
+
+}  // namespace
+}  // namespace vcnc
