@@ -30,6 +30,8 @@ constexpr double kChangeOfForm = 0.05;
 constexpr std::size_t kMostChanges = 5, kFewChanges = 3;
 /// Part of what is left that each of them must explain: less is what those before got wrong.
 constexpr double kShareOfChange = 0.1;
+/// The same at a drive where one was found.
+constexpr double kShareBeside = 0.5;
 
 /// Chi-square of the held-out laps that this makes.
 std::vector<double> forms_of(const Evidence& evidence, const DifferentialRecord& difference) {
@@ -66,6 +68,7 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
     options.max_effects = std::min(options.max_effects, kMostChanges);
     options.few_effects = std::min(options.few_effects, kFewChanges);
     options.least_share = std::max(options.least_share, kShareOfChange);
+    options.share_beside = std::max(options.share_beside, kShareBeside);
     options.form_of_channel = forms_of(evidence, *difference);
     options.form_um = 1e6 * kChangeOfForm *
                       std::hypot(difference->off[0], difference->off[1], difference->off[2]);

@@ -40,6 +40,9 @@ struct Candidate {
   std::string name() const { return place.empty() ? effect : place + "." + effect; }
 };
 
+/// Whether it is of the drive of an axis: servo, friction or mechanics.
+bool is_of_drive(const Candidate& candidate);
+
 /// The candidates of a machine, in the order of the library. Those whose place the record has no
 /// signal of are left out by the caller.
 std::vector<Candidate> candidates(const Machine& declared);

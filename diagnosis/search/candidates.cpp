@@ -89,6 +89,21 @@ bool can_be(const EffectPlace& place, const Machine& declared) {
   return true;
 }
 
+/// A zone lies within the travel of its axis and takes half of it at most: a wider one is friction
+/// as such.
+void keep_within_travel(const Machine& declared, Candidate& zone) {
+  const auto axis = static_cast<std::size_t>(
+      std::find(kAxisNames.begin(), kAxisNames.end(), zone.place) - kAxisNames.begin());
+  const double unit = is_rotary(axis) ? unit::deg.to_si : unit::mm.to_si;
+  const double low = declared.axes[axis].limits.min / unit,
+               high = declared.axes[axis].limits.max / unit;
+  for (FreeNumber& n : zone.numbers) {
+    if (n.key.find(".centre_") != std::string::npos) n.min = low, n.max = high;
+    if (n.key.find(".width_") != std::string::npos || n.key.find(".edge_") != std::string::npos)
+      n.max = std::min(n.max, (high - low) / 2);
+  }
+}
+
 void add_deviations(const Machine& declared, std::vector<Candidate>& all) {
   Machine machine = declared;
   for (const Parameter& p : parameters(machine)) {
@@ -105,6 +120,10 @@ void add_deviations(const Machine& declared, std::vector<Candidate>& all) {
 
 }  // namespace
 
+bool is_of_drive(const Candidate& c) {
+  return c.family == Family::servo || c.family == Family::friction || c.family == Family::mechanics;
+}
+
 std::vector<Candidate> candidates(const Machine& declared) {
   std::vector<Candidate> all;
   for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
@@ -112,6 +131,8 @@ std::vector<Candidate> candidates(const Machine& declared) {
     for (const EffectPlace& place : places_of(Effect::place))
       if (can_be<Effect>(place, declared)) add_candidate<Effect>(place, all);
   });
+  for (Candidate& c : all)
+    if (c.effect == FrictionZone::text.name) keep_within_travel(declared, c);
   add_deviations(declared, all);
   return all;
 }

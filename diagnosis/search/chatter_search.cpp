@@ -14,13 +14,11 @@ constexpr double kFrequency = 2;
 constexpr double kAmplitude = 30;  ///< differs as much as the frequency does by kFrequency
 constexpr double kAsStrong = 3;
 constexpr double kRestless = 3;  ///< times what the healthy run was
-constexpr double kSizes[] = {0.25, 1, 4};
+constexpr double kSizes[] = {1.0 / 16, 0.25, 1, 4};
 constexpr double kBetween = 2;  ///< from one size to where the next begins
 
 bool is_of_drive(const Candidate& c, std::size_t axis) {
-  return c.place == kAxisNames[axis] &&
-         (c.family == Family::servo || c.family == Family::friction ||
-          c.family == Family::mechanics);
+  return c.place == kAxisNames[axis] && is_of_drive(c);
 }
 
 /// Strongest line of an axis' own signals, its position if there is one; strength 0: none.

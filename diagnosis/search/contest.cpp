@@ -55,12 +55,17 @@ double ContestRules::threshold(double held_out) const {
   return threshold_of(options, excess(held_out));
 }
 
-double ContestRules::threshold(const std::vector<double>& before,
-                               const std::vector<double>& after) const {
+double ContestRules::left_where_gained(const std::vector<double>& before,
+                                       const std::vector<double>& after) const {
   double left = 0;
   for (const std::size_t c : shown_in(before, after))
     left += std::max(0.0, before[c] - floor_of[c]);
-  return threshold_of(options, left);
+  return left;
+}
+
+double ContestRules::threshold(const std::vector<double>& before,
+                               const std::vector<double>& after) const {
+  return threshold_of(options, left_where_gained(before, after));
 }
 
 bool ContestRules::stands_out(const std::vector<double>& before,
@@ -96,9 +101,7 @@ std::vector<Contender> Contest::contenders() {
     finish(all);
   }
   for (Contender& c : releases()) all.push_back(std::move(c));
-  for (Contender& c : all)
-    c.needed = c.released.empty() ? rules_.threshold(ground_.held_out_of, c.fit.held_out_of)
-                                  : rules_.options.release_gain;
+  for (Contender& c : all) c.needed = needed_of(c);
   std::erase_if(all, [&](const Contender& c) {
     return c.gain <= c.needed || counts(c.gain, c.fit.held_out_of) <= c.needed ||
            !rules_.stands_out(ground_.held_out_of, c.fit.held_out_of) ||
@@ -118,8 +121,19 @@ std::vector<Contender> Contest::rivals(double least, std::size_t but) const {
   std::erase_if(list, [&](const Screened& s) { return s.gain < least || candidate_of(s) == but; });
   if (list.size() > kRivals) list.resize(kRivals);
   std::vector<Contender> all = refitted(list);
+  for (Contender& c : releases())
+    if (c.gain >= least) all.push_back(std::move(c));
   sort_by_worth(all);
   return all;
+}
+
+bool Contest::says_it_simpler(const Contender& rival, const AddedEffect& effect,
+                              double gain) const {
+  if (rival.released.empty() || rival.gain < gain - band_of(gain)) return false;
+  Contender present;
+  present.candidate = effect.candidate;
+  present.numbers = effect.numbers;
+  return intricacy(rival) + (gain - rival.gain) / band_of(gain) < intricacy(present);
 }
 
 std::vector<std::size_t> Contest::equivalents(const std::vector<Contender>& contenders) const {
@@ -329,6 +343,15 @@ std::vector<Contender> Contest::releases() const {
     all.push_back(std::move(c));
   }
   return all;
+}
+
+double Contest::needed_of(const Contender& c) const {
+  if (!c.released.empty()) return rules_.options.release_gain;
+  const double needed = rules_.threshold(ground_.held_out_of, c.fit.held_out_of);
+  const Candidate& candidate = rules_.candidates[c.candidate];
+  if (!is_of_drive(candidate) || !places_found(now_).contains(candidate.place)) return needed;
+  return std::max(needed, rules_.options.share_beside *
+                              rules_.left_where_gained(ground_.held_out_of, c.fit.held_out_of));
 }
 
 double Contest::counts(double gain, const std::vector<double>& after) const {

@@ -50,6 +50,9 @@ struct ContestRules {
   /// The same of one that takes the channels from `before` to `after`: only what is left where it
   /// gains something is its concern.
   double threshold(const std::vector<double>& before, const std::vector<double>& after) const;
+  /// What is left beyond the floor where something is gained from `before` to `after`.
+  double left_where_gained(const std::vector<double>& before,
+                           const std::vector<double>& after) const;
   /// Whether what it explains is there at all: whatever repeats makes the residual larger than what
   /// laps differ by.
   bool stands_out(const std::vector<double>& before, const std::vector<double>& after) const;
@@ -63,8 +66,11 @@ class Contest {
   std::vector<Contender> contenders();
   /// Candidates that do as well as the first of the contenders.
   std::vector<std::size_t> equivalents(const std::vector<Contender>& contenders) const;
-  /// The candidates but one that may gain `least`, refitted, best first.
+  /// The candidates but one that may gain `least`, refitted, and declared numbers that do; best
+  /// first.
   std::vector<Contender> rivals(double least, std::size_t but) const;
+  /// Whether a declared number does as well as an effect that gains `gain`, and says less.
+  bool says_it_simpler(const Contender& rival, const AddedEffect& effect, double gain) const;
 
   /// Gains that differ by less are alike when the best is `gain`.
   double band_of(double gain) const;
@@ -88,6 +94,7 @@ class Contest {
   void put_simplest_first(std::vector<Contender>& all) const;
   double intricacy(const Contender& contender) const;
   bool under_two_conditions(const Contender& contender) const;
+  double needed_of(const Contender& contender) const;
   std::size_t candidate_of(const Screened& s) const;
 
   const ContestRules& rules_;

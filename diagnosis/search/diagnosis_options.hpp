@@ -39,6 +39,9 @@ struct DiagnosisOptions {
   std::vector<std::size_t> vibrating;
   std::size_t refits = 5, per_family = 2, pairs_of = 10;
   std::size_t max_effects = 8;
+  /// Part of what is left that a further effect at a drive must explain where one was found: what
+  /// that leaves in its own drive, another law of the same drive can always imitate a little.
+  double share_beside = 0;
   /// More than these are told only while each explains half of what the others leave: many that do
   /// a little imitate something else.
   std::size_t few_effects = 8;

@@ -114,14 +114,6 @@ bool is_axis(const std::string& place) {
   return std::find(kAxisNames.begin(), kAxisNames.end(), place) != kAxisNames.end();
 }
 
-/// Where something was found.
-std::set<std::string> places_found(const FittedMachine& m) {
-  std::set<std::string> places;
-  for (const FreedNumber& n : m.numbers()) places.insert(place_of(n.number.key));
-  for (const std::string& key : m.released) places.insert(place_of(key));
-  return places;
-}
-
 /// Declared numbers whose sensitivities are others than those of the declared machine: not those of
 /// a drive at which nothing was found.
 std::vector<std::size_t> concerned(const FittedMachine& m) {
@@ -188,6 +180,13 @@ std::vector<Explained> FittedMachine::explained() const {
   for (const AddedEffect& a : added) all.push_back(a.explained);
   for (const std::string& key : released) all.push_back(by_release.at(key));
   return all;
+}
+
+std::set<std::string> places_found(const FittedMachine& m) {
+  std::set<std::string> places;
+  for (const FreedNumber& n : m.numbers()) places.insert(place_of(n.number.key));
+  for (const std::string& key : m.released) places.insert(place_of(key));
+  return places;
 }
 
 std::vector<FreedNumber> FittedMachine::numbers() const {

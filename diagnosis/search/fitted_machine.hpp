@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <limits>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,9 @@ struct FittedMachine {
   /// With a declared number that was released held again as in `base`, nothing fitted.
   FittedMachine holding(const std::string& key, const FittedMachine& base) const;
 };
+
+/// Axes and other places at which something was found.
+std::set<std::string> places_found(const FittedMachine& machine);
 
 /// Fits all numbers of a machine together, nuisances included, until nothing moves.
 void converge(const Evidence& evidence, FittedMachine& machine);

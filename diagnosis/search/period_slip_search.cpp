@@ -32,19 +32,39 @@ int periods_in(double step, double period) {
   return std::abs(step / period - n) < kOff ? static_cast<int>(n) : 0;
 }
 
+/// Sums of squares of something that a step may be taken from.
+struct Misfit {
+  double as_it_is = 0, without = 0;
+
+  void add(double value, double step) {
+    if (!std::isfinite(value)) return;
+    as_it_is += value * value;
+    without += (value - step) * (value - step);
+  }
+  bool better_without() const { return without < as_it_is; }
+};
+
 /// Whether what follows from k on is nearer to nothing without the step: in the laps, if there are.
 bool stays(const Record& record, const Series& r, std::size_t k, double step) {
-  double with = 0, without = 0;
+  Misfit misfit;
   const auto add = [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = std::max(begin, k); i < end; ++i) {
-      if (!std::isfinite(r[i])) continue;
-      with += r[i] * r[i];
-      without += (r[i] - step) * (r[i] - step);
-    }
+    for (std::size_t i = std::max(begin, k); i < end; ++i) misfit.add(r[i], step);
   };
   for (const Stretch& s : record.stretches) add(s.begin, s.end);
   if (record.stretches.empty()) add(k, r.size());
-  return without < with;
+  return misfit.better_without();
+}
+
+/// Whether laps after k are like those of the same condition before, but for the step; so where
+/// there are none.
+bool laps_differ(const Record& record, const Series& r, std::size_t k, double step) {
+  Misfit misfit;
+  for (const Stretch& before : record.stretches)
+    for (const Stretch& after : record.stretches)
+      if (before.condition == after.condition && before.end <= k && k <= after.begin)
+        for (std::size_t i = 0; before.begin + i < before.end && after.begin + i < after.end; ++i)
+          misfit.add(r[after.begin + i] - r[before.begin + i], step);
+  return misfit.as_it_is == 0 || misfit.better_without();
 }
 
 }  // namespace
@@ -67,7 +87,8 @@ std::optional<PeriodSlip> find_period_slip(const Record& record,
     for (std::size_t k = kReach; k + kReach <= r.size(); ++k) {
       const int n = periods_in(r[k] - r[k - 1], period);
       if (n == 0 || !sudden(r, k, kQuietBeside * period) ||
-          periods_in(step_at(r, k), period) != n || !stays(record, r, k, n * period))
+          periods_in(step_at(r, k), period) != n || !stays(record, r, k, n * period) ||
+          !laps_differ(record, r, k, n * period))
         continue;
       const bool alone = std::all_of(residual.begin(), residual.end(), [&](const Series& other) {
         return &other == &r || !(std::abs(other[k] - other[k - 1]) > kQuietBeside * period);

@@ -5,7 +5,8 @@
 // laps included. A step counts if it is within 15 % of a whole number of periods, over one sample
 // and between the means of five before and after it, if these hardly move among themselves (a ball
 // that rings or turns over does), if no other channel takes part, if what follows is nearer to
-// nothing without it, and if it is the only one: slips that come and go are no slips.
+// nothing without it, and laps after it to those of the same condition before, and if it is the
+// only one: slips that come and go are no slips.
 #pragma once
 
 #include <optional>

@@ -217,11 +217,6 @@ class Search {
                                             options_.out_of_tolerance, options_.release_gain);
   }
 
-  static bool of_drive(const Candidate& c) {
-    return c.family == Family::servo || c.family == Family::friction ||
-           c.family == Family::mechanics;
-  }
-
   /// What an effect of a drive does depends on the others that it has (play rattles where nothing
   /// rubs): of axes at whose drive something was found, trials are simulated anew with that.
   void look_again(const FittedMachine& now) {
@@ -230,14 +225,14 @@ class Search {
     std::set<std::size_t> known;
     for (const AddedEffect& a : now.added) {
       known.insert(a.candidate);
-      if (of_drive(candidates_[a.candidate])) places.insert(candidates_[a.candidate].place);
+      if (is_of_drive(candidates_[a.candidate])) places.insert(candidates_[a.candidate].place);
     }
     std::vector<std::size_t> which;
     std::vector<Trial> again;
     for (std::size_t t = 0; t < result_.trials.size(); ++t) {
       const Trial& trial = result_.trials[t].trial;
       const Candidate& c = candidates_[trial.candidate];
-      if (!of_drive(c) || !places.contains(c.place) || known.contains(trial.candidate)) continue;
+      if (!is_of_drive(c) || !places.contains(c.place) || known.contains(trial.candidate)) continue;
       which.push_back(t);
       again.push_back(trial);
     }
@@ -256,7 +251,7 @@ class Search {
   bool asleep(const Candidate& c) const {
     const auto name = std::find(kAxisNames.begin(), kAxisNames.end(), c.place);
     if (name == kAxisNames.end()) return false;
-    if (!of_drive(c)) return false;
+    if (!is_of_drive(c)) return false;
     const auto axis = static_cast<std::size_t>(name - kAxisNames.begin());
     if (std::count(options_.vibrating.begin(), options_.vibrating.end(), axis) > 0) return true;
     const MeasuredSignal* command = evidence_.record().find(SignalKind::command, axis);
@@ -362,26 +357,33 @@ class Search {
   /// and all candidates compete for its place.
   void exchange(FittedMachine& m) {
     std::size_t tries = 2 * m.added.size();
-    for (std::size_t i = 0; i < m.added.size() && m.added.size() > 1 && tries-- > 0 && going_;) {
+    const auto found = [&] { return m.added.size() + m.released.size(); };
+    for (std::size_t i = 0; i < m.added.size() && found() > 1 && tries-- > 0 && going_;) {
       const FittedMachine less = taken_out(m, i);
       Contest contest(rules_, less);
       const double lost = contest.held_out() - m.held_out;
       const std::vector<Contender> rivals = contest.rivals(kNearLoss * lost, m.added[i].candidate);
       m.added[i].class_with.clear();
       for (const Contender& r : rivals)
-        if (r.gain > std::max(lost - contest.band_of(lost), 0.5 * lost))
+        if (r.released.empty() && r.gain > std::max(lost - contest.band_of(lost), 0.5 * lost))
           m.added[i].class_with.push_back(r.candidate);
       const double worth = lost - 4 * static_cast<double>(m.added[i].numbers.size()),
                    counts =
                        contest.counts(lost, Ground(evidence_, m.residual, m.linear()).held_out_of);
-      ++i;
+      const auto simpler = [&](const Contender& r) {
+        return contest.says_it_simpler(r, m.added[i], lost);
+      };
       const auto better = std::find_if(rivals.begin(), rivals.end(), [&](const Contender& r) {
-        return r.worth() >= worth && contest.counts(r.gain, r.fit.held_out_of) >= counts;
+        return simpler(r) ||
+               (r.worth() >= worth && contest.counts(r.gain, r.fit.held_out_of) >= counts);
       });
+      const double costs = better == rivals.end() || !simpler(*better) ? -options_.least_gain
+                                                                       : contest.band_of(lost);
+      ++i;
       if (better == rivals.end()) continue;
       FittedMachine other = less;
       add(other, *better, {});
-      if (other.held_out > m.held_out - options_.least_gain) {
+      if (other.held_out > m.held_out + costs) {
         evidence_.anchor(m.machine);
         continue;
       }

@@ -137,6 +137,14 @@ def set_up(rng):
     return out
 
 
+def leave_out(s, entries):
+    """The diagnosis is not to know of the effect of a scenario, and is to tell a law that acts where it does."""
+    effect = s["effects"][0]
+    s["without"] = effect["name"]
+    s["law_points"] = list(grading.HOOKS.get(entries[effect["name"]]["port"], ()))
+    s["law_axes"] = [effect["place"]] if effect["place"] in machine.AXES else list(machine.AXES)
+
+
 def own_scenarios(rng, counts, entries):
     names = sorted(set(entries) - NOT_REPEATABLE - BEFORE_THE_COMMAND - SET_UP)
     order, out = [], []
@@ -160,10 +168,7 @@ def own_scenarios(rng, counts, entries):
                 assignments.update(values)
                 s["values"].update(generate.by_component(values))
             if kind == "without":
-                effect = s["effects"][0]
-                s["without"] = effect["name"]
-                s["law_points"] = list(grading.HOOKS.get(entries[effect["name"]]["port"], ()))
-                s["law_axes"] = [effect["place"]] if effect["place"] in machine.AXES else list(machine.AXES)
+                leave_out(s, entries)
             s["assignments"] = assignments
             out.append(s)
     return out
@@ -277,6 +282,8 @@ def independent_run(vcnc, work, s, absolute):
     arguments = [str(work / f"test_{s['number']}.csv"), "--map", str(work / "map.toml"), "--model", str(work / "machine.toml")]
     if not absolute:
         arguments += ["--reference", str(work / s["reference"])]
+    if "without" in s:
+        arguments += ["--without", s["without"]]
     return diagnose(vcnc, s, arguments, work / f"{'absolute' if absolute else 'found'}_{s['number']}")
 
 
@@ -284,9 +291,12 @@ def independent_part(vcnc, work, seed, counts, jobs, individuals, absolute=False
     if (work / "answer_0.json").exists():  # drawn before, with its hashes
         drawn = [json.loads(p.read_text()) for p in sorted(work.glob("answer_*.json"))]
     else:
-        counts = {k: n for k, n in counts.items() if k != "without"}
         drawn = generate.generate(vcnc, work, seed, counts, individuals)
     drawn = [s for s in drawn if numbers is None or s["number"] in numbers]
+    entries = library(vcnc)
+    for s in drawn:
+        if s["kind"] == "without":
+            leave_out(s, entries)
     return pooled(jobs, lambda s: independent_run(vcnc, work, s, absolute), sorted(drawn, key=lambda s: s["number"]))
 
 
@@ -371,6 +381,7 @@ are written, and their SHA-256 printed, before anything is diagnosed; every run 
 * **own**: the virtual machine itself as the generator (`vcnc run --inject`), against the declared model: an easy setting, since
   friction law and controller are the diagnosis' own. *left out*: the effect is injected and taken out of the library
   (`vcnc diagnose --without`).
+* *left out*, in either part: the effect is injected and taken out of the library (`vcnc diagnose --without`).
 * **shuffled**: what the first single tests differ from their reference, lap by lap, moved to laps of other conditions. Nothing may be found.
 
 The program is 44 s: circles of 15 mm at F3000 and F6000 in both senses in a ring gauge, circles while C or A turns, strokes of Z;

@@ -85,6 +85,25 @@ TEST(Candidates, SidesAreThoseOfTheNullValue) {
   }
 }
 
+TEST(Candidates, AZoneOfFrictionLiesWithinTheTravel) {
+  Machine machine;
+  machine.axes[0].limits.min = -0.1;
+  machine.axes[0].limits.max = 0.3;
+  for (const Candidate& c : candidates(machine)) {
+    if (c.name() != "X.friction_zone") continue;
+    for (const FreeNumber& n : c.numbers) {
+      if (n.key.ends_with("centre_mm")) {
+        EXPECT_NEAR(n.min, -100, 1e-9);
+        EXPECT_NEAR(n.max, 300, 1e-9);
+      } else if (n.key.ends_with("width_mm") || n.key.ends_with("edge_mm")) {
+        EXPECT_NEAR(n.max, 200, 1e-9);
+      }
+    }
+    return;
+  }
+  FAIL() << "no such candidate";
+}
+
 TEST(AsHypothesis, TurnsChangedNumbersIntoDeviations) {
   const Machine declared = machine();
   Machine changed = declared;

@@ -288,6 +288,29 @@ TEST(PeriodSlipSearch, TakesOneStepOfWholePeriodsThatStays) {
   EXPECT_FALSE(stepped({{1, 696, 0.4 * kPeriod}, {1, 697, -0.4 * kPeriod}, {1, 700, kPeriod}}));
 }
 
+TEST(PeriodSlipSearch, LapsBeforeAndAfterMustDifferByIt) {
+  constexpr double kPeriod = 20e-6;
+  // Two laps of each of two conditions; the reading of the second one is off by a period.
+  Record record;
+  for (std::size_t lap = 0; lap < 4; ++lap)
+    record.stretches.push_back(
+        {500 * lap, 500 * (lap + 1), static_cast<int>(lap % 2), static_cast<int>(lap / 2), ""});
+  for (const bool slips : {false, true}) {
+    std::vector<double> x(2000, 0.0);
+    for (std::size_t k = 500; k < 2000; ++k) x[k] += (slips || k / 500 % 2 == 1 ? 1 : 0) * kPeriod;
+    if (!slips)  // between the second and the third lap nothing sudden happens
+      for (std::size_t k = 995; k < 1005; ++k)
+        x[k] = kPeriod * (1005 - static_cast<double>(k)) / 10;
+    Record r = record;
+    r.signals.push_back({SignalKind::deflection, 0, "x", x, 0});
+    for (std::size_t k = 1495; !slips && k < 1505; ++k)
+      r.signals[0].value[k] = kPeriod * (static_cast<double>(k) - 1495) / 10;
+    const auto found = find_period_slip(r, {{SignalKind::deflection, 0}},
+                                        {std::vector<double>(2000, 0.0)}, kPeriod);
+    EXPECT_EQ(found.has_value(), slips);
+  }
+}
+
 TEST(Diagnose, NamesProgramsThatThereAre) {
   const std::set<std::string> known{"circle", "cone", "diagnosis", "s-piece", "step"};
   Machine truth;

@@ -252,6 +252,71 @@ TEST(Selection, LooksAgainAtADriveAtWhichSomethingWasFound) {
   EXPECT_NEAR(number_of(result.found.machine, RattlingReplica::kPlay), 0.5, 0.02);
 }
 
+/// The readings of waves, and of a mass: that of the first two waves, and a little of a third.
+class WavesAndMass : public WaveReplica {
+ public:
+  using WaveReplica::WaveReplica;
+  static constexpr const char* kMass = "axes.X.load_kg";
+
+  Prediction predict(const Machine& m) const override {
+    const Prediction waves = WaveReplica::predict(m);
+    std::vector<double> x = waves[0];
+    const double um = 0.1 * (number_of(m, kMass) - number_of(Machine(), kMass));
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      const double lap = 2 * kPi * static_cast<double>(k) / 1000;
+      x[k] += 1e-6 * um * (std::sin(3 * lap) + std::sin(4 * lap) + 0.3 * std::sin(5 * lap));
+    }
+    return {x};
+  }
+};
+
+TEST(Selection, ADeclaredNumberThatStoodForEffectsGetsItsToleranceBack) {
+  Record record = toy::commands(1000, 4);
+  WavesAndMass replica(record.samples(), {{"effects.X.load_play.width_um", {1, 0}},
+                                          {"effects.Y.load_play.width_um", {0, 1}}});
+  Machine truth;
+  move_number(truth, "effects.X.load_play.width_um", 50);
+  move_number(truth, "effects.Y.load_play.width_um", 40);
+  std::vector<double> reading = replica.predict(truth)[0];
+  for (std::size_t k = 0; k < reading.size(); ++k)
+    reading[k] += toy::kProbeNoise * gaussian_noise(17, 0, k)[0];
+  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+  Evidence evidence(record, replica, {});
+  const SelectionResult result = select_effects_of(evidence, {}, replica.candidates(), {}, {});
+  ASSERT_FALSE(result.ladder.empty());
+  EXPECT_EQ(result.ladder.front().name, WavesAndMass::kMass);
+  EXPECT_EQ(result.found.added.size(), 2U);
+  EXPECT_TRUE(result.found.released.empty());
+  EXPECT_NEAR(number_of(result.found.machine, "effects.X.load_play.width_um"), 50, 0.5);
+}
+
+TEST(Selection, BesideAnotherOfItsDriveAnEffectMustExplainMoreOfWhatIsLeft) {
+  // The machine is the first and the second wave, and one that nothing explains.
+  Record record = toy::commands(1000, 4);
+  WaveReplica replica(record.samples(), {{"effects.X.load_play.width_um", {1, 0}},
+                                         {"effects.X.backlash.gap_um", {0, 1}}});
+  Machine truth;
+  move_number(truth, "effects.X.load_play.width_um", 3);
+  move_number(truth, "effects.X.backlash.gap_um", 1);
+  std::vector<double> reading = replica.predict(truth)[0];
+  for (std::size_t k = 0; k < reading.size(); ++k)
+    reading[k] += 2e-6 * std::sin(2 * kPi * 29 * static_cast<double>(k) / 1000) +
+                  toy::kProbeNoise * gaussian_noise(18, 0, k)[0];
+  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+  std::vector<Candidate> all = replica.candidates();
+  const std::string x = "X", y = "Y";
+  for (const std::string& place : {x, y})
+    for (const double share : {0.1, 0.5}) {
+      for (Candidate& c : all) c.family = Family::mechanics, c.place = x;
+      all[1].place = place;
+      Evidence evidence(record, replica, {});
+      DiagnosisOptions options;
+      options.share_beside = share;
+      const SelectionResult result = select_effects_of(evidence, {}, all, options, {});
+      EXPECT_EQ(result.found.added.size(), place == x && share == 0.5 ? 1U : 2U) << place;
+    }
+}
+
 TEST(Selection, ManyThatDoALittleEachAreNotTold) {
   const std::vector<const char*> keys{"effects.X.load_play.width_um",
                                       "effects.Y.load_play.width_um",
