@@ -100,7 +100,7 @@ std::vector<Contender> Contest::contenders() {
     std::move(others.begin(), others.end(), std::back_inserter(all));
     finish(all);
   }
-  for (Contender& c : releases()) all.push_back(std::move(c));
+  for (Contender& c : releases(Released::where_pulled)) all.push_back(std::move(c));
   for (Contender& c : all) c.needed = needed_of(c);
   std::erase_if(all, [&](const Contender& c) {
     return c.gain <= c.needed || counts(c.gain, c.fit.held_out_of) <= c.needed ||
@@ -121,7 +121,7 @@ std::vector<Contender> Contest::rivals(double least, std::size_t but) const {
   std::erase_if(list, [&](const Screened& s) { return s.gain < least || candidate_of(s) == but; });
   if (list.size() > kRivals) list.resize(kRivals);
   std::vector<Contender> all = refitted(list);
-  for (Contender& c : releases())
+  for (Contender& c : releases(Released::anywhere))
     if (c.gain >= least) all.push_back(std::move(c));
   sort_by_worth(all);
   return all;
@@ -321,20 +321,24 @@ void Contest::begin_elsewhere(Contender& best, const std::vector<Screened>& tria
     if (c.fit.fitted < best.fit.fitted && c.gain > best.gain) best = std::move(c);
 }
 
-/// A declared number whose tolerance is lifted competes with the effects.
-std::vector<Contender> Contest::releases() const {
+/// A declared number whose tolerance is lifted competes with the effects: one that pulls at it, or,
+/// where something was taken out that may have stood for it, any that then leaves it.
+std::vector<Contender> Contest::releases(Released which) const {
   std::vector<Contender> all;
   for (std::size_t i = 0; i < now_.nuisances.numbers.size(); ++i) {
     const FreedNumber& n = now_.nuisances.numbers[i];
-    if (n.common || std::abs(n.pull()) < rules_.options.out_of_tolerance ||
-        n.number.key.starts_with("effects.setup."))
+    const double far = rules_.options.out_of_tolerance;
+    if (n.common || n.tolerance <= 0 || n.number.key.starts_with("effects.setup.") ||
+        (which == Released::where_pulled && std::abs(n.pull()) < far))
       continue;
     Eigen::VectorXd precision = ground_.precision;
     precision[static_cast<Eigen::Index>(i)] = 0;
     const LinearStep s =
         linear_step(ground_.grams.fitted, ground_.grams.held_out, precision, linear_.offset());
     const double value = n.value + s.step[static_cast<Eigen::Index>(i)] * n.number.typical;
-    if (value < n.number.min || value > n.number.max) continue;
+    if (value < n.number.min || value > n.number.max ||
+        std::abs(value - n.centre) < far * n.tolerance)
+      continue;
     Contender c;
     c.released = n.number.key;
     c.numbers = {n};

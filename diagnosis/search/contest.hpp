@@ -89,7 +89,8 @@ class Contest {
                       double promised) const;
   void finish(std::vector<Contender>& all) const;
   void begin_elsewhere(Contender& best, const std::vector<Screened>& trials) const;
-  std::vector<Contender> releases() const;
+  enum class Released { where_pulled, anywhere };
+  std::vector<Contender> releases(Released which) const;
   void look_ahead(const std::vector<Screened>& screened, std::vector<Contender>& all) const;
   void put_simplest_first(std::vector<Contender>& all) const;
   double intricacy(const Contender& contender) const;

@@ -379,8 +379,7 @@ are written, and their SHA-256 printed, before anything is diagnosed; every run 
   piece is clamped anew (5 um, 20 urad) and the thermal state changes (friction 1 to 3 %, scales 1 ppm, drift 0.1 um/min).
 * **independent_absolute**: the same tests against the declared model alone.
 * **own**: the virtual machine itself as the generator (`vcnc run --inject`), against the declared model: an easy setting, since
-  friction law and controller are the diagnosis' own. *left out*: the effect is injected and taken out of the library
-  (`vcnc diagnose --without`).
+  friction law and controller are the diagnosis' own.
 * *left out*, in either part: the effect is injected and taken out of the library (`vcnc diagnose --without`).
 * **shuffled**: what the first single tests differ from their reference, lap by lap, moved to laps of other conditions. Nothing may be found.
 

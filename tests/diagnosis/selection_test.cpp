@@ -290,6 +290,32 @@ TEST(Selection, ADeclaredNumberThatStoodForEffectsGetsItsToleranceBack) {
   EXPECT_NEAR(number_of(result.found.machine, "effects.X.load_play.width_um"), 50, 0.5);
 }
 
+TEST(Selection, ADeclaredNumberTakesThePlaceOfAnEffectThatStoodForIt) {
+  // The mass is off, and there is Y. "first" is like the mass, and like a part of Y as well.
+  const std::string first = "effects.X.load_play.width_um", part = "effects.Z.load_play.width_um",
+                    y = "effects.Y.load_play.width_um";
+  Record record = toy::commands(1000, 4);
+  WavesAndMass replica(record.samples(), {{first.c_str(), {1, 1, 0.3, 0, 0}},
+                                          {part.c_str(), {0, 0, 0, 1, 0}},
+                                          {y.c_str(), {0, 0, 0, 1, 0.5}}});
+  Machine truth;
+  move_number(truth, WavesAndMass::kMass, 800);
+  move_number(truth, y, 12);
+  std::vector<double> reading = replica.predict(truth)[0];
+  for (std::size_t k = 0; k < reading.size(); ++k)
+    reading[k] += toy::kProbeNoise * gaussian_noise(19, 0, k)[0];
+  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+  Evidence evidence(record, replica, {});
+  const std::vector<Candidate> all{{"first", "", {{first, 1, 0, 1000}, {part, 1, 0, 1000}}, {}},
+                                   {"y", "", {{y, 1, 0, 1000}}, {}}};
+  const SelectionResult result = select_effects_of(evidence, {}, all, {}, {});
+  ASSERT_FALSE(result.ladder.empty());
+  EXPECT_EQ(result.ladder.front().name, "first");
+  EXPECT_EQ(names(result, all), std::string("y ") + WavesAndMass::kMass);
+  EXPECT_NEAR(number_of(result.found.machine, y), 12, 0.1);
+  EXPECT_NEAR(number_of(result.found.machine, WavesAndMass::kMass), 800, 1);
+}
+
 TEST(Selection, BesideAnotherOfItsDriveAnEffectMustExplainMoreOfWhatIsLeft) {
   // The machine is the first and the second wave, and one that nothing explains.
   Record record = toy::commands(1000, 4);
