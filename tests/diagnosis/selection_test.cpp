@@ -24,6 +24,14 @@ SelectionResult search(const Record& record, const Machine& declared) {
   return select_effects_of(evidence, declared, toy::candidates(), {}, {});
 }
 
+/// What `truth` would have read, with white noise.
+void read(Record& record, const Replica& replica, const Machine& truth, std::uint64_t seed) {
+  std::vector<double> reading = replica.predict(truth)[0];
+  for (std::size_t k = 0; k < reading.size(); ++k)
+    reading[k] += toy::kProbeNoise * gaussian_noise(seed, 0, k)[0];
+  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+}
+
 struct Injected {
   const char* key;
   double value;
@@ -188,10 +196,7 @@ TEST(Selection, StandInsForEachOtherAllGo) {
   Machine truth;
   move_number(truth, "effects.X.load_play.width_um", 1);
   move_number(truth, "effects.Y.load_play.width_um", 1);
-  std::vector<double> reading = replica.predict(truth)[0];
-  for (std::size_t k = 0; k < reading.size(); ++k)
-    reading[k] += toy::kProbeNoise * gaussian_noise(14, 0, k)[0];
-  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+  read(record, replica, truth, 14);
   Evidence evidence(record, replica, {});
   DiagnosisOptions options;
   options.max_effects = 2;  // a third would make "second" needless, and so drop it
@@ -240,10 +245,7 @@ TEST(Selection, LooksAgainAtADriveAtWhichSomethingWasFound) {
   Machine truth;
   move_number(truth, RattlingReplica::kFriction, 2);
   move_number(truth, RattlingReplica::kPlay, 0.5);
-  std::vector<double> reading = replica.predict(truth)[0];
-  for (std::size_t k = 0; k < reading.size(); ++k)
-    reading[k] += toy::kProbeNoise * gaussian_noise(16, 0, k)[0];
-  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+  read(record, replica, truth, 16);
   Evidence evidence(record, replica, {});
   const SelectionResult result =
       select_effects_of(evidence, {}, RattlingReplica::candidates(), {}, {});
@@ -277,10 +279,7 @@ TEST(Selection, ADeclaredNumberThatStoodForEffectsGetsItsToleranceBack) {
   Machine truth;
   move_number(truth, "effects.X.load_play.width_um", 50);
   move_number(truth, "effects.Y.load_play.width_um", 40);
-  std::vector<double> reading = replica.predict(truth)[0];
-  for (std::size_t k = 0; k < reading.size(); ++k)
-    reading[k] += toy::kProbeNoise * gaussian_noise(17, 0, k)[0];
-  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+  read(record, replica, truth, 17);
   Evidence evidence(record, replica, {});
   const SelectionResult result = select_effects_of(evidence, {}, replica.candidates(), {}, {});
   ASSERT_FALSE(result.ladder.empty());
@@ -301,10 +300,7 @@ TEST(Selection, ADeclaredNumberTakesThePlaceOfAnEffectThatStoodForIt) {
   Machine truth;
   move_number(truth, WavesAndMass::kMass, 800);
   move_number(truth, y, 12);
-  std::vector<double> reading = replica.predict(truth)[0];
-  for (std::size_t k = 0; k < reading.size(); ++k)
-    reading[k] += toy::kProbeNoise * gaussian_noise(19, 0, k)[0];
-  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+  read(record, replica, truth, 19);
   Evidence evidence(record, replica, {});
   const std::vector<Candidate> all{{"first", "", {{first, 1, 0, 1000}, {part, 1, 0, 1000}}, {}},
                                    {"y", "", {{y, 1, 0, 1000}}, {}}};
@@ -324,11 +320,10 @@ TEST(Selection, BesideAnotherOfItsDriveAnEffectMustExplainMoreOfWhatIsLeft) {
   Machine truth;
   move_number(truth, "effects.X.load_play.width_um", 3);
   move_number(truth, "effects.X.backlash.gap_um", 1);
-  std::vector<double> reading = replica.predict(truth)[0];
+  read(record, replica, truth, 18);
+  std::vector<double>& reading = record.signals.back().value;
   for (std::size_t k = 0; k < reading.size(); ++k)
-    reading[k] += 2e-6 * std::sin(2 * kPi * 29 * static_cast<double>(k) / 1000) +
-                  toy::kProbeNoise * gaussian_noise(18, 0, k)[0];
-  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+    reading[k] += 2e-6 * std::sin(2 * kPi * 29 * static_cast<double>(k) / 1000);
   std::vector<Candidate> all = replica.candidates();
   const std::string x = "X", y = "Y";
   for (const std::string& place : {x, y})
@@ -360,10 +355,7 @@ TEST(Selection, ManyThatDoALittleEachAreNotTold) {
     move_number(truth, keys[i], 1);
   }
   WaveReplica replica(record.samples(), waves);
-  std::vector<double> reading = replica.predict(truth)[0];
-  for (std::size_t k = 0; k < reading.size(); ++k)
-    reading[k] += toy::kProbeNoise * gaussian_noise(15, 0, k)[0];
-  record.signals.push_back({SignalKind::deflection, 0, "", reading, 0});
+  read(record, replica, truth, 15);
   for (const std::size_t few : {1U, 8U}) {
     Evidence evidence(record, replica, {});
     DiagnosisOptions options;
