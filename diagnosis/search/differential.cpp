@@ -90,8 +90,7 @@ Clamped as_clamped(const Record& run, Replica& replica, const Machine& declared)
   std::vector<FreedNumber> clamping = nuisances(declared);
   std::erase_if(clamping,
                 [](const FreedNumber& n) { return !n.number.key.starts_with("effects.setup."); });
-  return {fit_numbers(evidence, declared, std::move(clamping)).machine,
-          {evidence.noise().lines, unrest_of(evidence)},
+  return {fit_numbers(evidence, declared, std::move(clamping)).machine, healthy_noise(evidence),
           evidence.events()};
 }
 

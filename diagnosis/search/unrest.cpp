@@ -73,6 +73,16 @@ std::vector<Unrest> unrest_of(const Evidence& evidence) {
   });
 }
 
+HealthyNoise healthy_noise(const Evidence& evidence) {
+  HealthyNoise healthy{evidence.noise().lines, unrest_of(evidence)};
+  const std::vector<ComparedChannel>& channels = evidence.replica().channels();
+  for (Unrest& u : healthy.unrest)
+    for (std::size_t c = 0; c < channels.size(); ++c)
+      if (channels[c].kind == u.channel.kind && channels[c].axis == u.channel.axis && u.rms > 0)
+        u.rms = std::max(u.rms, evidence.noise().channels[c].rms);
+  return healthy;
+}
+
 std::vector<Unrest> unrest_of(const Evidence& evidence, const Prediction& prediction) {
   return unrest_of(evidence,
                    [&](std::size_t c) -> const std::vector<double>& { return prediction[c]; });

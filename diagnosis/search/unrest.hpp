@@ -32,6 +32,8 @@ bool is_of_drive(const ComparedChannel& channel, std::size_t axis);
 
 /// Of every position and force of a record.
 std::vector<Unrest> unrest_of(const Evidence& evidence);
+/// Of a healthy run; no signal is quieter than its noise, which is that of the replica at least.
+HealthyNoise healthy_noise(const Evidence& evidence);
 /// The same of a prediction, which has no noise.
 std::vector<Unrest> unrest_of(const Evidence& evidence, const Prediction& prediction);
 

@@ -75,5 +75,30 @@ TEST(Unrest, IsNotWhatChangesSlowly) {
   EXPECT_LT(rest, 1.1 * toy::kForceNoise);
 }
 
+TEST(Unrest, OfAHealthyRunIsNoLessThanAReplicaIsExact) {
+  // A virtual drive without noise: what it does otherwise is rounding.
+  Record record = to_and_fro();
+  toy::measure(record, {}, 22);
+  toy::ToyReplica replica(record);
+  const Prediction exact = replica.predict({});
+  for (std::size_t c = 0; c < exact.size(); ++c) {
+    const ComparedChannel& channel = replica.channels()[c];
+    for (MeasuredSignal& s : record.signals)
+      if (s.kind == channel.kind)
+        for (std::size_t k = 0; k < s.value.size(); ++k)
+          s.value[k] = exact[c][k] * (1 + 1e-12 * gaussian_noise(23, c, k)[0]) +
+                       1e-15 * gaussian_noise(24, c, k)[0];
+  }
+  const Evidence evidence(record, replica, {});
+  std::size_t known = 0;
+  for (const Unrest& u : healthy_noise(evidence).unrest) {
+    known += u.rms > 0;
+    if (u.rms > 0) {
+      EXPECT_GE(u.rms, u.channel.kind == SignalKind::force ? 1e-6 : 1e-9);
+    }
+  }
+  EXPECT_EQ(known, 4U);  // position and force, in motion and at rest
+}
+
 }  // namespace
 }  // namespace vcnc
