@@ -83,10 +83,13 @@ class ChatterSearch {
   };
 
   std::vector<ChatterCause> causes_of(const Chatter& chatter) const {
-    std::vector<ChatterCause> causes;
+    std::vector<ChatterCause> causes;  // one for every run of sizes
+    bool goes_on = false;
     for (const Tried& t : tried(chatter)) {
-      if (!is_like(t.does, chatter)) continue;
-      if (causes.empty() || causes.back().candidate != t.candidate) causes.push_back(t.does);
+      const bool joins = goes_on && causes.back().candidate == t.candidate;
+      goes_on = is_like(t.does, chatter);
+      if (!goes_on) continue;
+      if (!joins) causes.push_back(t.does);
       ChatterCause& cause = causes.back();
       const FreeNumber& number = candidates_[t.candidate].numbers.front();
       const double first = number_of(declared_, number.key), unit = number.typical;
@@ -103,7 +106,12 @@ class ChatterSearch {
       if (x.as_strong != y.as_strong) return x.as_strong;
       return unlike(x, chatter) < unlike(y, chatter);
     });
-    return causes;
+    std::vector<ChatterCause> likest;  // of each candidate
+    for (const ChatterCause& c : causes)
+      if (std::none_of(likest.begin(), likest.end(),
+                       [&](const ChatterCause& l) { return l.candidate == c.candidate; }))
+        likest.push_back(c);
+    return likest;
   }
 
   static bool is_like(const ChatterCause& model, const Chatter& measured) {
