@@ -61,13 +61,15 @@ DifferentialRecord less_reference(const DiagnoseOptions& options, const Record& 
 int compare_models(const DiagnoseOptions& options, const Record& record, const Machine& declared) {
   const Machine found = load_machine(options.compare);
   std::vector<SignalFigure> figures;
+  Machine before = declared;
   if (options.reference.empty()) {
-    append_figures(figures, record, declared, found, "run");
+    append_figures(figures, record, before, found, "run");
   } else {
     const DifferentialRecord difference = less_reference(options, record, declared);
-    append_figures(figures, difference.record, difference.healthy, found, "run");
+    before = difference.healthy;
+    append_figures(figures, difference.record, before, found, "run");
   }
-  predict_tests(options, declared, found, figures);
+  predict_tests(options, before, found, figures);
   std::cout << figures_table(figures);
   return stop_requested() ? kExitInterrupted : kExitOk;
 }

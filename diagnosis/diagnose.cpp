@@ -80,8 +80,7 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
   options.share_of_found = kShareOfFound;
   SelectionResult selection =
       select_effects_of(evidence, declared, of.candidates, options, keep_going);
-  bring_to_simplest_form(evidence, declared, of.candidates, options, selection.floor,
-                         selection.found);
+  bring_to_simplest_form(evidence, declared, options, selection.floor, selection.found);
   return findings_of(of, evidence, options, std::move(selection), std::move(before),
                      difference != nullptr);
 }
@@ -101,7 +100,7 @@ Diagnosis diagnose(const DiagnosisCase& of, const DifferentialRecord& difference
   // A change of such a number would be no change.
   std::vector<Candidate> candidates = of.candidates;
   std::erase_if(candidates, [&](const Candidate& c) {
-    return c.numbers.size() == 1 && has_key(with_common.common, c.numbers.front().key);
+    return c.numbers.size() == 1 && is_common(with_common.common, c.numbers.front().key);
   });
   return explained({difference.record, replica, difference.healthy, std::move(candidates)},
                    of.record, &difference, with_common, keep_going);

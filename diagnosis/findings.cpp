@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "diagnosis/replica/model_comparison.hpp"
+#include "diagnosis/search/common_numbers.hpp"
 #include "diagnosis/search/consequence.hpp"
 #include "diagnosis/search/freed_number.hpp"
 #include "diagnosis/search/generic_laws.hpp"
@@ -102,7 +103,7 @@ class Report {
     tell_figures();
     tell_ladder();
     judge();
-    leave_common_as_declared();
+    d_.found = without_common(d_.found);
     return std::move(d_);
   }
 
@@ -176,8 +177,8 @@ class Report {
     }
     for (const FreedNumber& n : found().nuisances.numbers) {
       const std::string& key = n.number.key;
-      if (std::find(found().released.begin(), found().released.end(), key) ==
-          found().released.end())
+      if (std::none_of(found().released.begin(), found().released.end(),
+                       [&](const ReleasedNumber& r) { return r.key == key; }))
         continue;
       FoundEffect e;
       e.name = "deviation";
@@ -250,9 +251,10 @@ class Report {
                     of_.candidates[c.candidate].name();
         if (likely.empty()) likely = fmt::format(" No effect on the drive of {} does so", axis);
         d_.notes.push_back(text + "." + likely + ".");
-        if (chatter.has_line())
-          d_.vibrations.push_back(
-              fmt::format("{} vibrates by itself at {:.0f} Hz", axis, chatter.line.frequency));
+        d_.vibrations.push_back(
+            chatter.has_line()
+                ? fmt::format("{} vibrates by itself at {:.0f} Hz", axis, chatter.line.frequency)
+                : fmt::format("{} is restless", axis));
         continue;
       }
       const ChatterCause& cause = chatter.causes.front();
@@ -289,14 +291,15 @@ class Report {
     const ShownUnit unit = shown_unit(u.channel);
     return fmt::format("{} {} by {:.3g} {} rms", channel_name(u.channel),
                        u.at_rest ? "trembles at rest" : "differs from lap to lap",
-                       u.rms * unit.factor, unit.name);
+                       u.rms.value_or(0) * unit.factor, unit.name);
   }
 
   /// Whether a line is that of an axis that vibrates by itself.
   bool is_of_chatter(const NoiseLine& line) const {
     return std::any_of(before_.chatter.begin(), before_.chatter.end(), [&](const Chatter& c) {
-      return (line.channel.axis == c.axis && line.channel.kind != SignalKind::deflection) ||
-             std::abs(line.frequency - c.line.frequency) < 0.02 * c.line.frequency;
+      return c.has_line() &&
+             ((line.channel.axis == c.axis && line.channel.kind != SignalKind::deflection) ||
+              std::abs(line.frequency - c.line.frequency) < 0.02 * c.line.frequency);
     });
   }
 
@@ -403,7 +406,7 @@ class Report {
                                     options_.share_of_form * std::min(left, options_.form)});
     const std::vector<double> base = evidence_.chi2_of(selection_.base.residual, Role::held_out),
                               now = evidence_.chi2_of(found().residual, Role::held_out);
-    const bool anything = !found().added.empty() || !found().released.empty();
+    const bool anything = found().found() > 0;
     LawFit law;
     if (!quiet)
       law = best_law(
@@ -422,8 +425,8 @@ class Report {
         std::string names;
         for (const AddedEffect& a : found().added)
           names += (names.empty() ? "" : " with ") + of_.candidates[a.candidate].name();
-        for (const std::string& key : found().released)
-          names += (names.empty() ? "" : " with ") + key;
+        for (const ReleasedNumber& r : found().released)
+          names += (names.empty() ? "" : " with ") + r.key;
         d_.notes.push_back(fmt::format("It looks like {}, but {} alone fits better.", names,
                                        words_of(instead.law.law)));
         std::erase_if(d_.effects, [](const FoundEffect& e) {
@@ -483,12 +486,6 @@ class Report {
       for (std::size_t c = 0; c < channels.size(); ++c)
         d_.figures.push_back({channels[c], name, evidence_.rms(before, c, role),
                               evidence_.rms(after, c, role), evidence_.noise().channels[c].rms});
-  }
-
-  /// They say what a change does, not what the machine is (common_numbers.hpp).
-  void leave_common_as_declared() {
-    for (const FreedNumber& n : found().nuisances.numbers)
-      if (n.common) move_number(d_.found, n.number.key, n.centre);
   }
 
   void tell_ladder() {

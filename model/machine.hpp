@@ -86,6 +86,8 @@ struct ServoParams {
   double velocity_ff = 1;          ///< 1 = full velocity feed-forward
   double acceleration_ff = 1;      ///< 1 = full acceleration feed-forward
   double current_lag = 0;          ///< first-order lag of the force/torque [s]
+  double position_lag = 0;         ///< first-order lag of the position loop [s], cascade only
+  double velocity_lag = 0;         ///< of the filter of the measured velocity [s], cascade only
   Feedback feedback = Feedback::load;
 
   template <class Self, class Visit>
@@ -108,6 +110,10 @@ struct ServoParams {
     visit("acceleration_ff", p.acceleration_ff, unit::none, Range{0, 2},
           "acceleration feed-forward, 1 = full");
     visit("current_lag_us", p.current_lag, unit::us, Range{0, 5000}, "lag of the current loop");
+    visit("position_lag_us", p.position_lag, unit::us, Range{0, 5000},
+          "lag of the position loop of a cascade: half its cycle, and its computing time");
+    visit("velocity_lag_us", p.velocity_lag, unit::us, Range{0, 5000},
+          "lag of the filter of a cascade's measured velocity");
     visit.choice("feedback", p.feedback, {{"motor", Feedback::motor}, {"load", Feedback::load}},
                  "measuring system: indirect (motor) or direct (load)");
   }

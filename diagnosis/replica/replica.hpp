@@ -18,6 +18,8 @@ namespace vcnc {
 struct ComparedChannel {
   SignalKind kind = SignalKind::position;
   std::size_t axis = 0;
+
+  bool operator==(const ComparedChannel&) const = default;
 };
 
 /// Numbers that never change; copies share them.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "diagnosis/search/freed_number.hpp"
 #include "model/axes.hpp"
@@ -13,7 +14,6 @@ constexpr double kLoud = 300;  ///< power over the noise around
 constexpr double kFrequency = 2;
 constexpr double kAmplitude = 30;  ///< differs as much as the frequency does by kFrequency
 constexpr double kAsStrong = 3;
-constexpr double kRestless = 3;  ///< times what the healthy run was
 constexpr double kSizes[] = {1.0 / 16, 0.25, 1, 4};
 constexpr double kBetween = 2;  ///< from one size to where the next begins
 
@@ -41,9 +41,7 @@ double factors(double a, double b, double base) {
 /// In the healthy run; 0: not known.
 double before(const HealthyNoise& healthy, const Unrest& of) {
   for (const Unrest& u : healthy.unrest)
-    if (u.channel.kind == of.channel.kind && u.channel.axis == of.channel.axis &&
-        u.at_rest == of.at_rest)
-      return u.rms;
+    if (u.channel == of.channel && u.at_rest == of.at_rest) return u.rms.value_or(0);
   return 0;
 }
 
@@ -62,34 +60,27 @@ class ChatterSearch {
     Chatter c{.axis = axis, .line = {}, .unrest = {}, .causes = {}};
     for (const Unrest& u : measured_) {
       const double was = before(healthy_, u);
-      if (!is_of_drive(u.channel, axis) || was <= 0 || u.rms < c.times * was) continue;
+      if (!is_of_drive(u.channel, axis) || was <= 0 || !u.rms || *u.rms < c.times * was) continue;
       c.unrest = u;
-      c.times = u.rms / was;
+      c.times = *u.rms / was;
     }
     const NoiseLine line = strongest(evidence_.noise().lines, axis),
                     was = strongest(healthy_.lines, axis);
     if (line.strength > 0 && !(was.strength > 0 && line.amplitude < 2 * was.amplitude))
       c.line = line;
-    if (c.has_line() || c.times > kRestless) c.causes = causes_of(c);
+    if (c.has_line() || c.is_restless()) c.causes = causes_of(c);
     return c;
   }
 
  private:
-  /// A candidate of the drive at one size, and what the model does with it.
-  struct Tried {
-    std::size_t candidate = 0;
-    double size = 0;
-    ChatterCause does;
-  };
-
   std::vector<ChatterCause> causes_of(const Chatter& chatter) const {
     std::vector<ChatterCause> causes;  // one for every run of sizes
     bool goes_on = false;
-    for (const Tried& t : tried(chatter)) {
+    for (const ChatterCause& t : tried(chatter)) {
       const bool joins = goes_on && causes.back().candidate == t.candidate;
-      goes_on = is_like(t.does, chatter);
+      goes_on = is_like(t, chatter);
       if (!goes_on) continue;
-      if (!joins) causes.push_back(t.does);
+      if (!joins) causes.push_back(t);
       ChatterCause& cause = causes.back();
       const FreeNumber& number = candidates_[t.candidate].numbers.front();
       const double first = number_of(declared_, number.key), unit = number.typical;
@@ -97,10 +88,10 @@ class ChatterSearch {
       cause.high = first + unit * t.size * kBetween;
       // Sizes go up by a constant factor: the middle one of those so far.
       cause.size = std::sqrt((cause.low - first) * (cause.high - first)) / unit;
-      if (unlike(t.does, chatter) >= unlike(cause, chatter)) continue;
-      cause.line = t.does.line;
-      cause.unrest = t.does.unrest;
-      cause.as_strong = t.does.as_strong;
+      if (unlike(t, chatter) >= unlike(cause, chatter)) continue;
+      cause.line = t.line;
+      cause.unrest = t.unrest;
+      cause.as_strong = t.as_strong;
     }
     std::stable_sort(causes.begin(), causes.end(), [&](const auto& x, const auto& y) {
       if (x.as_strong != y.as_strong) return x.as_strong;
@@ -122,18 +113,19 @@ class ChatterSearch {
 
   /// How unlike two vibrations are.
   static double unlike(const ChatterCause& model, const Chatter& measured) {
-    if (!measured.has_line()) return factors(model.unrest.rms, measured.unrest.rms, kAsStrong);
+    if (!measured.has_line()) return factors(*model.unrest.rms, *measured.unrest.rms, kAsStrong);
     return std::max(factors(model.line.frequency, measured.line.frequency, kFrequency),
                     factors(model.line.amplitude, measured.line.amplitude, kAmplitude));
   }
 
-  std::vector<Tried> tried(const Chatter& chatter) const {
-    std::vector<Tried> all;
+  /// Every candidate of the drive at every size, and what the model does with it.
+  std::vector<ChatterCause> tried(const Chatter& chatter) const {
+    std::vector<ChatterCause> all;
     std::vector<Machine> machines;
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
       if (!is_of_drive(candidates_[c], chatter.axis)) continue;
       for (const double size : kSizes) {
-        all.push_back({c, size, {.candidate = c, .size = size, .line = {}, .unrest = {}}});
+        all.push_back({.candidate = c, .size = size, .line = {}, .unrest = {}});
         machines.push_back(with_candidate(declared_, candidates_[c], size));
       }
     }
@@ -142,7 +134,7 @@ class ChatterSearch {
       const std::vector<Prediction> predictions =
           evidence_.predict_all({machines.begin() + static_cast<std::ptrdiff_t>(first),
                                  machines.begin() + static_cast<std::ptrdiff_t>(last)});
-      for (std::size_t i = first; i < last; ++i) look(predictions[i - first], chatter, all[i].does);
+      for (std::size_t i = first; i < last; ++i) look(predictions[i - first], chatter, all[i]);
     }
     return all;
   }
@@ -151,25 +143,31 @@ class ChatterSearch {
   void look(const Prediction& prediction, const Chatter& chatter, ChatterCause& does) const {
     if (chatter.has_line()) does.line = line_of(prediction, chatter.line.channel);
     const bool at_rest = chatter.unrest.at_rest && !chatter.has_line();
-    does.as_strong = true;
     const std::vector<Unrest> model = unrest_of(evidence_, prediction);
+    double most = std::numeric_limits<double>::infinity();  // how unlike the signals are
     for (std::size_t i = 0; i < model.size(); ++i) {
       const Unrest& is = measured_[i];
-      if (!is_of_drive(is.channel, chatter.axis) || is.rms <= 0) continue;
-      if (is.at_rest != at_rest) continue;
-      const double rms = std::hypot(model[i].rms, before(healthy_, is));
-      if (factors(rms, is.rms, kAsStrong) > 1) does.as_strong = false;
+      if (!is_of_drive(is.channel, chatter.axis) || is.at_rest != at_rest) continue;
+      if (!is.rms || !model[i].rms) continue;
+      const double was = before(healthy_, is), rms = std::hypot(*model[i].rms, was),
+                   measured = std::max(*is.rms, was);
+      if (measured <= 0) continue;
+      const double differs = factors(rms, measured, kAsStrong);
+      most = std::isinf(most) ? differs : std::max(most, differs);
       if (is.channel.kind == chatter.unrest.channel.kind)
         does.unrest = {is.channel, is.at_rest, rms};
     }
+    does.as_strong = most <= 1;
   }
 
   /// The strongest line in a channel, as laps of a prediction differ.
   NoiseLine line_of(const Prediction& prediction, const ComparedChannel& channel) const {
     const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
-    std::size_t at = 0;
-    while (channels[at].kind != channel.kind || channels[at].axis != channel.axis) ++at;
-    return strongest(vibrations(evidence_.record(), evidence_.partition(), channel, prediction[at]),
+    const auto at = static_cast<std::size_t>(std::find(channels.begin(), channels.end(), channel) -
+                                             channels.begin());
+    std::vector<double> change = prediction[at];
+    for (std::size_t k = 0; k < change.size(); ++k) change[k] -= evidence_.declared()[at][k];
+    return strongest(vibrations(evidence_.record(), evidence_.partition(), channel, change),
                      channel.axis);
   }
 
@@ -181,6 +179,11 @@ class ChatterSearch {
 };
 
 }  // namespace
+
+bool Chatter::is_restless() const {
+  constexpr double kRestless = 3;  // times what the healthy run was
+  return times > kRestless;
+}
 
 Machine with_candidate(Machine machine, const Candidate& c, double size) {
   for (std::size_t i = 0; i < c.numbers.size(); ++i) {
@@ -199,7 +202,7 @@ std::vector<Chatter> find_chatter(const Evidence& evidence, const Machine& decla
   const ChatterSearch search(evidence, declared, candidates, healthy);
   std::vector<Chatter> all;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    if (Chatter c = search.chatter_of(axis); c.has_line() || c.times > kRestless)
+    if (Chatter c = search.chatter_of(axis); c.has_line() || c.is_restless())
       all.push_back(std::move(c));
   return all;
 }

@@ -49,6 +49,7 @@ struct Chatter {
   std::vector<ChatterCause> causes;  ///< the likest first; none: something outside the drive
 
   bool has_line() const { return line.strength > 0; }
+  bool is_restless() const;
   /// Whether what the drive does can be told from what it should do.
   bool hides_drive() const { return has_line() || !causes.empty(); }
 };

@@ -1,9 +1,9 @@
 #include "diagnosis/search/common_numbers.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "model/parameters.hpp"
@@ -14,11 +14,28 @@ namespace {
 constexpr double kStep = 0.1;            // of a tolerance, to see what a number does
 constexpr std::size_t kRemembered = 64;  // series
 
-double tolerance_of(const std::string& key) {
-  if (key == "probe.damping_ratio") return 0.5;
-  if (key.starts_with("axes.") && key.ends_with(".current_lag_us")) return 0.3;
+/// Of what is declared, or in the unit of the key.
+struct Tolerance {
+  std::string_view prefix, end;
+  double share, size;
+};
+constexpr Tolerance kTolerances[] = {
+    {"probe.damping_ratio", "", 0.5, 0},
+    {"axes.", ".current_lag_us", 0.3, 0},
+    {"axes.", ".position_lag_us", 0, 500},
+    {"axes.", ".velocity_lag_us", 0, 500},
+    {"effects.", ".presliding.stiffness_N_per_um", 0.5, 0},
+    {"effects.", ".presliding.stiffness_Nm_per_rad", 0.5, 0},
+};
+
+/// In the unit of the key.
+double tolerance_of(const std::string& key, double value) {
+  for (const Tolerance& t : kTolerances)
+    if (key.starts_with(t.prefix) && key.ends_with(t.end)) return t.share * value + t.size;
   return 0;
 }
+
+std::string own_key(const FreedNumber& n) { return n.number.key.substr(kCommon.size()); }
 
 }  // namespace
 
@@ -26,16 +43,25 @@ std::vector<FreedNumber> common_numbers(const Machine& healthy) {
   Machine copy = healthy;
   std::vector<FreedNumber> all;
   for (const Parameter& p : parameters(copy)) {
-    const double value = p.in_unit(), tolerance = tolerance_of(p.key) * std::abs(value);
+    const double value = p.in_unit(), tolerance = tolerance_of(p.key, value);
     if (tolerance <= 0) continue;
-    all.push_back(
-        {.number = {.key = p.key, .typical = tolerance, .min = p.range.min, .max = p.range.max},
-         .value = value,
-         .centre = value,
-         .tolerance = tolerance,
-         .common = true});
+    all.push_back({.number = {.key = std::string(kCommon) + p.key,
+                              .typical = tolerance,
+                              .min = p.range.min - value,
+                              .max = p.range.max - value},
+                   .tolerance = tolerance});
   }
   return all;
+}
+
+Machine without_common(Machine hypothesis) {
+  std::erase_if(hypothesis.effects.deviations,
+                [](const Deviation& d) { return d.key.starts_with(kCommon); });
+  return hypothesis;
+}
+
+bool is_common(const std::vector<FreedNumber>& common, const std::string& key) {
+  return has_key(common, std::string(kCommon) + key);
 }
 
 ReplicaOfChange::ReplicaOfChange(Replica& replica, const Machine& healthy,
@@ -48,7 +74,7 @@ ReplicaOfChange::ReplicaOfChange(Replica& replica, const Machine& healthy,
 }
 
 void ReplicaOfChange::anchor(const Machine& machine) {
-  anchor_ = as_declared(machine);
+  anchor_ = without_common(machine);
   replica_.anchor(anchor_);
   of_change_.assign(common_.size(), {});
   latest_.clear();
@@ -60,7 +86,7 @@ Prediction ReplicaOfChange::predict(const Machine& hypothesis) const {
 
 std::vector<Prediction> ReplicaOfChange::predict_all(const std::vector<Machine>& hypotheses) const {
   std::vector<Machine> declared;
-  for (const Machine& h : hypotheses) declared.push_back(as_declared(h));
+  for (const Machine& h : hypotheses) declared.push_back(without_common(h));
   std::vector<Prediction> all = replica_.predict_all(declared);
   const std::lock_guard lock(guard_);
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -71,17 +97,9 @@ std::vector<Prediction> ReplicaOfChange::predict_all(const std::vector<Machine>&
   return all;
 }
 
-Machine ReplicaOfChange::as_declared(const Machine& hypothesis) const {
-  std::vector<FreedNumber> declared = common_;
-  for (FreedNumber& n : declared) n.value = n.centre;
-  return with(hypothesis, declared);
-}
-
 std::vector<double> ReplicaOfChange::off_healthy(const Machine& hypothesis) const {
-  std::vector<FreedNumber> numbers = common_;
-  take_values(numbers, hypothesis);
   std::vector<double> off;
-  for (const FreedNumber& n : numbers) off.push_back(n.value - n.centre);
+  for (const FreedNumber& n : common_) off.push_back(number_of(hypothesis, n.number.key));
   return off;
 }
 
@@ -90,8 +108,8 @@ std::vector<SeriesOfChannels> ReplicaOfChange::derivatives(
   std::vector<Machine> moved{about};
   for (const std::size_t j : numbers) {
     moved.push_back(about);
-    move_number(moved.back(), common_[j].number.key,
-                common_[j].centre + kStep * common_[j].tolerance);
+    const std::string key = own_key(common_[j]);
+    move_number(moved.back(), key, number_of(about, key) + kStep * common_[j].tolerance);
   }
   const std::vector<Prediction> answers = replica_.predict_all(moved);
   std::vector<SeriesOfChannels> all;

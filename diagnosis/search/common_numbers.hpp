@@ -5,16 +5,19 @@
 // not: a suspension that lags by 0.5 ms lags what a fault moves the ball by, too. To first order a
 // hypothesis m says of the run, once the healthy run is accounted for (differential.hpp),
 //
-//   yhat(m) = yhat(m_0) + sum_j (theta_j(m) - theta_j) (d yhat/d theta_j (m_0) - d yhat/d theta_j
-//   (h))
+//   yhat(m, theta) = yhat(m) + sum_j theta_j (d yhat/d theta_j (m) - d yhat/d theta_j (h))
 //
-// m_0: m with these numbers as declared, h: the healthy machine. Such a number does nothing at h,
-// and the more the further a hypothesis is from it. Derivatives are taken where the replica is
-// exact (Replica::anchor()); numbers are never moved in a simulation, since where they belong may
-// be out of what the model can do (a suspension without damping rings).
+// theta: less what is declared, h: the healthy machine. Such a number does nothing at h, and the
+// more the further a hypothesis is from it. Derivatives are taken where the replica is exact
+// (Replica::anchor()); numbers are never moved in a simulation, since where they belong may be out
+// of what the model can do (a suspension without damping rings), and since the same number may have
+// changed between the runs, too.
 //
 //   damping of the probe's suspension          50 %
 //   lag of the current loop                    30 %
+//   lag of the position loop                   0.5 ms, half a cycle of 1 ms
+//   lag of the measured velocity               0.5 ms
+//   stiffness of pre-sliding                   50 %: other laws than one bristle turn over slower
 #pragma once
 
 #include <cstddef>
@@ -29,6 +32,10 @@ namespace vcnc {
 
 /// With their tolerances; those that are zero are not among them.
 std::vector<FreedNumber> common_numbers(const Machine& healthy);
+/// Whether the number of a machine file with this key is among them.
+bool is_common(const std::vector<FreedNumber>& common, const std::string& key);
+/// The machine itself, without what goes along with it.
+Machine without_common(Machine hypothesis);
 
 class ReplicaOfChange final : public Replica {
  public:
@@ -52,7 +59,6 @@ class ReplicaOfChange final : public Replica {
   };
 
   std::vector<double> off_healthy(const Machine& hypothesis) const;
-  Machine as_declared(const Machine& hypothesis) const;
   /// Changes of the predictions per unit of some numbers, about a machine.
   std::vector<SeriesOfChannels> derivatives(const Machine& about,
                                             const std::vector<std::size_t>& numbers) const;

@@ -84,7 +84,7 @@ Contest::Contest(const ContestRules& rules, const FittedMachine& now)
       now_(now),
       linear_(now.linear()),
       ground_(rules.evidence, now.residual, linear_),
-      doubt_(now.added.empty() && now.released.empty()
+      doubt_(now.found() == 0
                  ? doubt_of(rules.options)
                  : doubt_of(rules.options, now.explained(), rules.base_of, ground_.held_out_of)) {}
 
@@ -315,6 +315,7 @@ void Contest::begin_elsewhere(Contender& best, const std::vector<Screened>& tria
     if (candidate_of(s) != best.candidate || tried++ == 0) continue;  // it began at the first
     if (others.size() == kElsewhere || !rules_.go("trying other shapes", 0)) break;
     others.push_back(contender({s.trial}, s.size, s.gain));
+    others.back().needed = needed_of(others.back());
   }
   finish(others);
   for (Contender& c : others)
@@ -328,7 +329,7 @@ std::vector<Contender> Contest::releases(Released which) const {
   for (std::size_t i = 0; i < now_.nuisances.numbers.size(); ++i) {
     const FreedNumber& n = now_.nuisances.numbers[i];
     const double far = rules_.options.out_of_tolerance;
-    if (n.common || n.tolerance <= 0 || n.number.key.starts_with("effects.setup.") ||
+    if (n.common() || n.tolerance <= 0 || n.number.key.starts_with("effects.setup.") ||
         (which == Released::where_pulled && std::abs(n.pull()) < far))
       continue;
     Eigen::VectorXd precision = ground_.precision;
@@ -351,11 +352,20 @@ std::vector<Contender> Contest::releases(Released which) const {
 
 double Contest::needed_of(const Contender& c) const {
   if (!c.released.empty()) return rules_.options.release_gain;
-  const double needed = rules_.threshold(ground_.held_out_of, c.fit.held_out_of);
-  const Candidate& candidate = rules_.candidates[c.candidate];
-  if (!is_of_drive(candidate) || !places_found(now_).contains(candidate.place)) return needed;
-  return std::max(needed, rules_.options.share_beside *
-                              rules_.left_where_gained(ground_.held_out_of, c.fit.held_out_of));
+  return needed_of({c.candidate}, c.fit.held_out_of);
+}
+
+double Contest::needed_of(const std::vector<std::size_t>& together,
+                          const std::vector<double>& after) const {
+  const double needed = rules_.threshold(ground_.held_out_of, after);
+  const std::set<std::string> drives = drives_found(now_, rules_.candidates);
+  if (std::none_of(together.begin(), together.end(), [&](std::size_t c) {
+        const Candidate& candidate = rules_.candidates[c];
+        return is_of_drive(candidate) && drives.contains(candidate.place);
+      }))
+    return needed;
+  return std::max(
+      needed, rules_.options.share_beside * rules_.left_where_gained(ground_.held_out_of, after));
 }
 
 double Contest::counts(double gain, const std::vector<double>& after) const {
@@ -416,7 +426,7 @@ void Contest::look_ahead(const std::vector<Screened>& screened, std::vector<Cont
   if (best->counted < single + least) return;
   const std::size_t other = pairs[static_cast<std::size_t>(best - together.begin())].second;
   Contender c = contender({best->trial, screened[other].trial}, best->size, best->gain);
-  c.needed = rules_.threshold(ground_.held_out_of, c.fit.held_out_of);
+  c.needed = needed_of({c.candidate, candidate_of(screened[other])}, c.fit.held_out_of);
   if (counts(c.gain, c.fit.held_out_of) > single + least &&
       rules_.stands_out(ground_.held_out_of, c.fit.held_out_of))
     all.insert(all.begin(), std::move(c));

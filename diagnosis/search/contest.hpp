@@ -96,6 +96,9 @@ class Contest {
   double intricacy(const Contender& contender) const;
   bool under_two_conditions(const Contender& contender) const;
   double needed_of(const Contender& contender) const;
+  /// The same of candidates that leave `after` together.
+  double needed_of(const std::vector<std::size_t>& together,
+                   const std::vector<double>& after) const;
   std::size_t candidate_of(const Screened& s) const;
 
   const ContestRules& rules_;

@@ -13,6 +13,15 @@ namespace {
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kDeviations = 5;  ///< of a number that is seen at all
 
+/// What all laps and the tolerances tell of the declared numbers, of full rank.
+Eigen::MatrixXd information_of(const Ground& ground) {
+  const Eigen::Index n = ground.precision.size();
+  Eigen::MatrixXd a = (ground.grams.fitted + ground.grams.held_out).block(1, 1, n, n);
+  a.diagonal() += ground.precision;
+  a.diagonal().array() += 1e-10 * (1e-6 + a.diagonal().array());
+  return a;
+}
+
 /// Steps at which as much gain counts as is needed, from the gain of one step in each channel.
 double steps_to(const std::vector<double>& per_step, const Needed& needed) {
   const auto counts = [&](double squared) {
@@ -22,7 +31,7 @@ double steps_to(const std::vector<double>& per_step, const Needed& needed) {
     return sum;
   };
   double low = 1e-24, high = 1e24;
-  if (counts(high) < needed.counted_gain) return std::numeric_limits<double>::infinity();
+  if (counts(high) < needed.counted_gain) return kNever;
   while (high / low > 1.0001) {
     const double middle = std::sqrt(low * high);
     (counts(middle) < needed.counted_gain ? low : high) = middle;
@@ -91,10 +100,7 @@ std::vector<Bracket> far_below(const std::vector<TrialColumns>& trials) {
 void find_detection_limits(const Evidence& evidence, const Ground& ground, const Needed& needed,
                            std::vector<TrialColumns>& trials) {
   const Eigen::Index n = ground.precision.size();
-  Eigen::MatrixXd a = (ground.grams.fitted + ground.grams.held_out).block(1, 1, n, n);
-  a.diagonal() += ground.precision;
-  a.diagonal().array() += 1e-10 * (1e-6 + a.diagonal().array());
-  const Eigen::LDLT<Eigen::MatrixXd> factor(a);
+  const Eigen::LDLT<Eigen::MatrixXd> factor(information_of(ground));
   parallel_for(trials.size(), [&](std::size_t i) {
     TrialColumns& t = trials[i];
     t.ground.learn(evidence, ground.columns, t.columns);
@@ -153,11 +159,9 @@ void try_detection_limits(const Evidence& evidence, const Machine& base,
 std::vector<double> release_limits(const Ground& ground, const std::vector<FreedNumber>& numbers,
                                    double pull, double gain) {
   const Eigen::Index n = ground.precision.size();
-  Eigen::MatrixXd a = (ground.grams.fitted + ground.grams.held_out).block(1, 1, n, n);
-  a.diagonal() += ground.precision;
-  a.diagonal().array() += 1e-10 * (1e-6 + a.diagonal().array());
-  const Eigen::MatrixXd inverse = a.ldlt().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
-  std::vector<double> limits(numbers.size(), std::numeric_limits<double>::infinity());
+  const Eigen::MatrixXd inverse =
+      information_of(ground).ldlt().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
+  std::vector<double> limits(numbers.size(), kNever);
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
     const double prior = ground.precision[at], information = 1 / inverse(at, at) - prior;

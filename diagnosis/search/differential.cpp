@@ -113,9 +113,8 @@ DifferentialRecord less_healthy(const Record& now, const Record& healthy, Replic
   std::size_t fewest = 0, unmatched = 0;
   for (MeasuredSignal& signal : result.record.signals) {
     if (!is_compared(signal.kind)) continue;
-    const auto channel = std::find_if(
-        channels.begin(), channels.end(),
-        [&](const ComparedChannel& c) { return c.kind == signal.kind && c.axis == signal.axis; });
+    const auto channel =
+        std::find(channels.begin(), channels.end(), ComparedChannel{signal.kind, signal.axis});
     const MeasuredSignal* partner = healthy.find(signal.kind, signal.axis);
     std::vector<double> left(signal.value.size(), kMissing);
     if (channel != channels.end() && partner) {

@@ -67,6 +67,8 @@ class Evidence {
   const Replica& replica() const { return replica_; }
   const Partition& partition() const { return partition_; }
   const NoiseAudit& noise() const { return noise_; }
+  /// What the declared machine would have measured.
+  const Prediction& declared() const { return declared_; }
   /// What was left out for it: of the axis' own channels, and of the readings.
   const std::vector<LapEvent>& events() const { return events_; }
 

@@ -178,15 +178,30 @@ constexpr double kPulledFar = 1.5;
 std::vector<Explained> FittedMachine::explained() const {
   std::vector<Explained> all;
   for (const AddedEffect& a : added) all.push_back(a.explained);
-  for (const std::string& key : released) all.push_back(by_release.at(key));
+  for (const ReleasedNumber& r : released) all.push_back(r.explained);
   return all;
 }
 
 std::set<std::string> places_found(const FittedMachine& m) {
   std::set<std::string> places;
   for (const FreedNumber& n : m.numbers()) places.insert(place_of(n.number.key));
-  for (const std::string& key : m.released) places.insert(place_of(key));
+  for (const ReleasedNumber& r : m.released) places.insert(place_of(r.key));
   return places;
+}
+
+std::set<std::string> drives_found(const FittedMachine& m,
+                                   const std::vector<Candidate>& candidates) {
+  std::set<std::string> drives;
+  for (const AddedEffect& a : m.added)
+    if (is_of_drive(candidates[a.candidate])) drives.insert(candidates[a.candidate].place);
+  for (const ReleasedNumber& r : m.released) {
+    const bool of_drive = std::any_of(candidates.begin(), candidates.end(), [&](const auto& c) {
+      return is_of_drive(c) && std::any_of(c.numbers.begin(), c.numbers.end(),
+                                           [&](const auto& n) { return n.key == r.key; });
+    });
+    if (of_drive || r.key.starts_with("axes.")) drives.insert(place_of(r.key));
+  }
+  return drives;
 }
 
 std::vector<FreedNumber> FittedMachine::numbers() const {
@@ -197,7 +212,7 @@ std::vector<FreedNumber> FittedMachine::numbers() const {
 
 FittedMachine FittedMachine::holding(const std::string& key, const FittedMachine& base) const {
   FittedMachine held = *this;
-  std::erase(held.released, key);
+  std::erase_if(held.released, [&](const ReleasedNumber& r) { return r.key == key; });
   for (FreedNumber& n : held.nuisances.numbers)
     for (const FreedNumber& as : base.nuisances.numbers)
       if (n.number.key == key && as.number.key == key) n.tolerance = as.tolerance;
@@ -253,7 +268,7 @@ void hold_common(FittedMachine& m) {
   std::vector<FreedNumber> held;
   for (FreedNumber n : m.nuisances.numbers) {
     const std::string place = place_of(n.number.key);
-    if (!n.common || places.contains(place) || (!is_axis(place) && !places.empty())) continue;
+    if (!n.common() || places.contains(place) || (!is_axis(place) && !places.empty())) continue;
     n.value = n.centre;
     held.push_back(n);
   }

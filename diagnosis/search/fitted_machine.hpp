@@ -3,11 +3,11 @@
 
 #include <cstddef>
 #include <limits>
-#include <map>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "diagnosis/search/candidate.hpp"
 #include "diagnosis/search/counted_gain.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/refit.hpp"
@@ -23,19 +23,25 @@ struct AddedEffect {
   std::vector<std::size_t> class_with{};  ///< candidates that do as well
 };
 
+/// A declared number found out of tolerance.
+struct ReleasedNumber {
+  std::string key;
+  Explained explained{};  ///< as of an effect, with its tolerance
+};
+
 /// A machine by hypothesis with all that was computed at it.
 struct FittedMachine {
   Machine machine;
   std::vector<AddedEffect> added;
-  LinearPart nuisances;               ///< those of released declared numbers have no tolerance
-  std::vector<std::string> released;  ///< declared numbers found out of tolerance
-  std::map<std::string, Explained> by_release;  ///< what releasing each of them explained
+  LinearPart nuisances;  ///< those of released declared numbers have no tolerance
+  std::vector<ReleasedNumber> released;
   Prediction prediction;
   Column residual;
   std::vector<Column> columns;  ///< of all numbers of `added`, in order
   double held_out = std::numeric_limits<double>::infinity();
 
   std::vector<FreedNumber> numbers() const;  ///< of all added effects
+  std::size_t found() const { return added.size() + released.size(); }
   std::vector<Explained> explained() const;  ///< by each, and each released number
   /// Nuisances and added effects with their columns.
   LinearPart linear() const;
@@ -45,6 +51,9 @@ struct FittedMachine {
 
 /// Axes and other places at which something was found.
 std::set<std::string> places_found(const FittedMachine& machine);
+/// Axes at whose drive something was found.
+std::set<std::string> drives_found(const FittedMachine& machine,
+                                   const std::vector<Candidate>& candidates);
 
 /// Fits all numbers of a machine together, nuisances included, until nothing moves.
 void converge(const Evidence& evidence, FittedMachine& machine);

@@ -45,6 +45,14 @@ double tolerance_of(const std::string& key, double value) {
   return 0;
 }
 
+/// Of a machine or of a const one; null where there is none.
+template <class M>
+auto common_of(M& machine, const std::string& key) -> decltype(machine.effects.deviations.data()) {
+  for (auto& d : machine.effects.deviations)
+    if (d.key == key) return &d;
+  return nullptr;
+}
+
 }  // namespace
 
 bool never_quite_absent(const std::string& key) {
@@ -54,6 +62,10 @@ bool never_quite_absent(const std::string& key) {
 }
 
 double number_of(const Machine& machine, const std::string& key) {
+  if (key.starts_with(kCommon)) {
+    const Deviation* d = common_of(machine, key);
+    return d ? d->value : 0;
+  }
   Machine copy = machine;
   for (const Parameter& p : parameters(copy))
     if (p.key == key) return p.in_unit();
@@ -63,6 +75,12 @@ double number_of(const Machine& machine, const std::string& key) {
 }
 
 void move_number(Machine& machine, const std::string& key, double value) {
+  if (key.starts_with(kCommon)) {
+    Deviation* d = common_of(machine, key);
+    if (!d) d = &machine.effects.deviations.emplace_back(Deviation{key, 0});
+    d->value = value;
+    return;
+  }
   for (const Parameter& p : parameters(machine)) {
     if (p.key != key) continue;
     *p.value = std::clamp(value, p.range.min, p.range.max) * p.unit.to_si;
@@ -77,8 +95,11 @@ void move_number(Machine& machine, const std::string& key, double value) {
 }
 
 Machine with(Machine machine, const std::vector<FreedNumber>& numbers) {
+  for (const FreedNumber& n : numbers)
+    if (n.common()) move_number(machine, n.number.key, n.value);
   std::vector<Parameter> all = parameters(machine);
   for (const FreedNumber& n : numbers) {
+    if (n.common()) continue;
     const auto p = std::find_if(all.begin(), all.end(),
                                 [&](const Parameter& q) { return q.key == n.number.key; });
     if (p == all.end())
@@ -99,6 +120,8 @@ void take_values(std::vector<FreedNumber>& numbers, const Machine& machine) {
   for (const Parameter& p : parameters(copy))
     for (FreedNumber& n : numbers)
       if (n.number.key == p.key) n.value = p.in_unit();
+  for (FreedNumber& n : numbers)
+    if (n.common()) n.value = number_of(machine, n.number.key);
 }
 
 bool has_key(const std::vector<FreedNumber>& numbers, const std::string& key) {

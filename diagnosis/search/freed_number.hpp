@@ -3,12 +3,17 @@
 
 #include <limits>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "diagnosis/search/candidate.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {
+
+/// What precedes the key of a number that a run and its healthy run have in common. It goes along
+/// with a hypothesis, as one of its deviations, and changes nothing in the machine.
+inline constexpr std::string_view kCommon = "common:";
 
 /// A number with what is known of it, in the unit of its key. Fits count it in `number.typical`.
 struct FreedNumber {
@@ -17,8 +22,9 @@ struct FreedNumber {
   double centre = 0;     ///< declared
   double tolerance = 0;  ///< standard deviation of the declaration; 0: nothing is known
   bool shape = false;    ///< frequency, time constant, ...: moved in small steps
-  bool common = false;   ///< the same in the healthy run (common_numbers.hpp)
 
+  /// The same in the healthy run (common_numbers.hpp): counted from what is declared.
+  bool common() const { return number.key.starts_with(kCommon); }
   double pull() const { return tolerance > 0 ? (value - centre) / tolerance : 0; }
   /// Inverse variance of the declaration in units of the typical size.
   double precision() const {
@@ -26,7 +32,8 @@ struct FreedNumber {
   }
 };
 
-/// In the unit of the key. Throws std::invalid_argument for an unknown key.
+/// In the unit of the key, common ones less what is declared. Throws std::invalid_argument for an
+/// unknown key.
 double number_of(const Machine& machine, const std::string& key);
 /// Like set_parameter(), but what is out of range becomes the nearest that is allowed.
 void move_number(Machine& machine, const std::string& key, double value);

@@ -13,7 +13,7 @@ constexpr double kNormal95 = 1.96;
 constexpr double kExactForm = 0.01;
 /// What the scatter of few conditions misses of the variance between them.
 constexpr double kFewConditions = 1.3;
-constexpr double kFewLaps = 4;  ///< whose scatter tells nothing
+constexpr double kFewLaps = 4;  ///< too few for their scatter to tell anything
 /// Standard deviation of a number, of the size of its effect, by the form of the law.
 constexpr double kKnownTo = 0.02;
 

@@ -2,8 +2,8 @@
 //
 // Noise: the largest of what the curvature of chi-square tells, times what chi-square is too large
 // by, of the scatter between blocks of a second (sandwich; White 1980), and of that between laps:
-// an axis that rests elsewhere within a step of its encoder shifts a whole lap, and
-// a drift bends after that. Where the model is known not to be exact, two things are added in
+// an axis that rests elsewhere within a step of its encoder shifts a whole lap, and a fitted drift
+// follows such shifts. Where the model is known not to be exact, two things are added in
 // quadrature instead of the last: the scatter between the conditions of the run, by Student's t
 // and 1.3 for what so few of them miss, since what a model gets wrong is alike in all laps of a
 // condition; and 4 % of the largest amplitude of the effect, since no law of an effect is known

@@ -216,8 +216,14 @@ std::vector<NoiseLine> vibrations(const Record& record, const Partition& partiti
   return laps.empty() ? std::vector<NoiseLine>{} : find_lines(channel, laps, record.period, 0);
 }
 
-double lap_scatter(const Partition& partition, const std::vector<double>& series) {
-  return std::sqrt(covariances(lap_noise(partition, series))[0]);
+std::optional<double> lap_scatter(const Partition& partition, const std::vector<double>& series) {
+  const std::vector<LapNoise> laps = lap_noise(partition, series);
+  const auto known = [](double x) { return std::isfinite(x); };
+  if (std::none_of(laps.begin(), laps.end(), [&](const LapNoise& lap) {
+        return std::any_of(lap.value.begin(), lap.value.end(), known);
+      }))
+    return {};
+  return std::sqrt(covariances(laps)[0]);
 }
 
 NoiseAudit audit_noise(const Record& record, const Partition& partition,

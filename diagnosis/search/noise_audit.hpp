@@ -19,6 +19,7 @@
 // its own past counts as noise, so that effects are underrated, not overrated.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -67,8 +68,8 @@ std::vector<NoiseLine> vibrations(const Record& record, const Partition& partiti
                                   const ComparedChannel& channel,
                                   const std::vector<double>& series);
 
-/// RMS of what laps of a condition differ by; 0 where none is repeated.
-double lap_scatter(const Partition& partition, const std::vector<double>& series);
+/// RMS of what laps of a condition differ by; none where no sample is there in several laps.
+std::optional<double> lap_scatter(const Partition& partition, const std::vector<double>& series);
 
 /// `residual` is one series per channel, NaN where there is nothing to compare; `rounding`
 /// likewise, or empty (Replica::rounding()).

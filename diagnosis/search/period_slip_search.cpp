@@ -35,9 +35,11 @@ int periods_in(double step, double period) {
 /// Sums of squares of something that a step may be taken from.
 struct Misfit {
   double as_it_is = 0, without = 0;
+  bool empty = true;
 
   void add(double value, double step) {
     if (!std::isfinite(value)) return;
+    empty = false;
     as_it_is += value * value;
     without += (value - step) * (value - step);
   }
@@ -64,7 +66,7 @@ bool laps_differ(const Record& record, const Series& r, std::size_t k, double st
       if (before.condition == after.condition && before.end <= k && k <= after.begin)
         for (std::size_t i = 0; before.begin + i < before.end && after.begin + i < after.end; ++i)
           misfit.add(r[after.begin + i] - r[before.begin + i], step);
-  return misfit.as_it_is == 0 || misfit.better_without();
+  return misfit.empty || misfit.better_without();
 }
 
 }  // namespace

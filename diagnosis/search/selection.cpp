@@ -85,11 +85,11 @@ class Search {
       look_again(now);
       exchange(now);
       ladder.push_back(step_of(now, ladder.size()));
-      if (now.added.size() + now.released.size() >= options_.max_effects) break;
+      if (now.found() >= options_.max_effects) break;
       if (imitates(now)) break;
       Contest contest(rules_, now);
       const std::vector<Contender> next = contest.contenders();
-      if (now.added.size() + now.released.size() >= options_.few_effects && !next.empty() &&
+      if (now.found() >= options_.few_effects && !next.empty() &&
           next.front().gain < kHalf * rules_.excess(now.held_out))
         break;
       if (!accept_one(now, next, contest)) break;
@@ -221,18 +221,15 @@ class Search {
   /// rubs): of axes at whose drive something was found, trials are simulated anew with that.
   void look_again(const FittedMachine& now) {
     result_.trials = at_base_;
-    std::set<std::string> places;
+    const std::set<std::string> drives = drives_found(now, candidates_);
     std::set<std::size_t> known;
-    for (const AddedEffect& a : now.added) {
-      known.insert(a.candidate);
-      if (is_of_drive(candidates_[a.candidate])) places.insert(candidates_[a.candidate].place);
-    }
+    for (const AddedEffect& a : now.added) known.insert(a.candidate);
     std::vector<std::size_t> which;
     std::vector<Trial> again;
     for (std::size_t t = 0; t < result_.trials.size(); ++t) {
       const Trial& trial = result_.trials[t].trial;
       const Candidate& c = candidates_[trial.candidate];
-      if (!is_of_drive(c) || !places.contains(c.place) || known.contains(trial.candidate)) continue;
+      if (!is_of_drive(c) || !drives.contains(c.place) || known.contains(trial.candidate)) continue;
       which.push_back(t);
       again.push_back(trial);
     }
@@ -266,8 +263,7 @@ class Search {
     if (!best.released.empty()) {
       for (FreedNumber& n : m.nuisances.numbers)
         if (n.number.key == best.released) n.tolerance = 0;
-      m.released.push_back(best.released);
-      m.by_release[best.released] = explained;
+      m.released.push_back({best.released, explained});
       add_common(evidence_, m, options_.common);
       converge(evidence_, m);
       settle_in(evidence_, m);
@@ -319,8 +315,10 @@ class Search {
   /// where that costs little.
   void hold_again(FittedMachine& m) {
     for (std::size_t i = m.released.size(); i-- > 0;) {
-      FittedMachine held = m.holding(m.released[i], result_.base);
+      FittedMachine held = m.holding(m.released[i].key, result_.base);
       const Ground ground(evidence_, held.residual, held.linear());
+      m.released[i].explained =
+          minus(ground.held_out_of, evidence_.chi2_of(m.residual, Role::held_out));
       if (ground.held_out - m.held_out > options_.release_gain) continue;
       held.held_out = ground.held_out;
       converge(evidence_, held);
@@ -330,14 +328,15 @@ class Search {
 
   /// What one added effect is worth: without it, all others moved along their columns.
   double weigh(FittedMachine& m, std::size_t i) const {
-    const FittedMachine less = taken_out(m, i);
+    const FittedMachine less = taken_out(m, i, Common::held);
     const Ground ground(evidence_, less.residual, less.linear());
     m.added[i].explained = minus(ground.held_out_of, evidence_.chi2_of(m.residual, Role::held_out));
     return m.added[i].gain = ground.held_out - m.held_out;
   }
 
   /// Without one of its effects, everything else as it was.
-  FittedMachine taken_out(const FittedMachine& m, std::size_t i) const {
+  enum class Common { held, free };
+  FittedMachine taken_out(const FittedMachine& m, std::size_t i, Common common) const {
     FittedMachine less = m;
     std::size_t first = 0;
     for (std::size_t j = 0; j < i; ++j) first += m.added[j].numbers.size();
@@ -346,7 +345,7 @@ class Search {
     less.added.erase(less.added.begin() + static_cast<std::ptrdiff_t>(i));
     for (const FreeNumber& n : candidates_[m.added[i].candidate].numbers)
       move_number(less.machine, n.key, number_of(declared_, n.key));
-    hold_common(less);
+    if (common == Common::held) hold_common(less);
     less.prediction = evidence_.predict(less.machine);
     less.residual = evidence_.residual(less.prediction);
     less.held_out = Ground(evidence_, less.residual, less.linear()).held_out;
@@ -354,41 +353,42 @@ class Search {
   }
 
   /// Effects that were accepted when others were still missing may be stand-ins: each is taken out
-  /// and all candidates compete for its place.
+  /// and all candidates compete for its place, with those common numbers that it had.
   void exchange(FittedMachine& m) {
     std::size_t tries = 2 * m.added.size();
-    const auto found = [&] { return m.added.size() + m.released.size(); };
-    for (std::size_t i = 0; i < m.added.size() && found() > 1 && tries-- > 0 && going_;) {
-      const FittedMachine less = taken_out(m, i);
+    for (std::size_t i = 0; i < m.added.size() && m.found() > 1 && tries-- > 0 && going_;) {
+      const FittedMachine less = taken_out(m, i, Common::free);
       Contest contest(rules_, less);
+      AddedEffect& present = m.added[i];
       const double lost = contest.held_out() - m.held_out;
-      const std::vector<Contender> rivals = contest.rivals(kNearLoss * lost, m.added[i].candidate);
-      m.added[i].class_with.clear();
+      const std::vector<Contender> rivals = contest.rivals(kNearLoss * lost, present.candidate);
+      present.class_with.clear();
       for (const Contender& r : rivals)
         if (r.released.empty() && r.gain > std::max(lost - contest.band_of(lost), 0.5 * lost))
-          m.added[i].class_with.push_back(r.candidate);
-      const double worth = lost - 4 * static_cast<double>(m.added[i].numbers.size()),
+          present.class_with.push_back(r.candidate);
+      const double worth = lost - 4 * static_cast<double>(present.numbers.size()),
                    counts =
                        contest.counts(lost, Ground(evidence_, m.residual, m.linear()).held_out_of);
       const auto simpler = [&](const Contender& r) {
-        return contest.says_it_simpler(r, m.added[i], lost);
+        return contest.says_it_simpler(r, present, lost);
       };
       const auto better = std::find_if(rivals.begin(), rivals.end(), [&](const Contender& r) {
         return simpler(r) ||
                (r.worth() >= worth && contest.counts(r.gain, r.fit.held_out_of) >= counts);
       });
-      const double costs = better == rivals.end() || !simpler(*better) ? -options_.least_gain
-                                                                       : contest.band_of(lost);
-      ++i;
-      if (better == rivals.end()) continue;
+      if (better == rivals.end()) {
+        ++i;
+        continue;
+      }
+      const double allowed_loss = simpler(*better) ? contest.band_of(lost) : -options_.least_gain;
       FittedMachine other = less;
       add(other, *better, {});
-      if (other.held_out > m.held_out + costs) {
+      if (other.held_out > m.held_out + allowed_loss) {
         evidence_.anchor(m.machine);
+        ++i;
         continue;
       }
       m = std::move(other);  // the one that came in is the last, so that the next one is here
-      --i;
     }
   }
 
@@ -405,7 +405,7 @@ class Search {
   LadderStep step_of(const FittedMachine& m, std::size_t before) const {
     LadderStep r{
         m.added.empty() ? "" : candidates_[m.added.back().candidate].name(), m.held_out, {}};
-    if (!m.released.empty() && before >= m.added.size()) r.name = m.released.back();
+    if (!m.released.empty() && before >= m.added.size()) r.name = m.released.back().key;
     for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
       r.rms.push_back(evidence_.rms(m.prediction, c, Role::held_out));
     return r;

@@ -6,7 +6,7 @@
 //     refit                  the best few nonlinearly (refit.hpp); pairs where no one explains half
 //     accept                 the one with the largest gain on held-out laps, if it is enough
 //     converge, drop test    all together; what is no longer needed goes
-//     exchange               each one taken out, all candidates compete for its place
+//     exchange               each one taken out, all candidates and declared numbers compete
 //   begin otherwise          where much is left: with another of the first contenders
 //
 // Where names leave more than a tenth, a law without a name (generic_laws.hpp) is fitted alone. The
@@ -15,8 +15,9 @@
 //
 // A gain is chi-square on held-out laps (whose expectation is their number of samples when nothing
 // but noise is left) and of the priors of the declared numbers. It must exceed 25 and 2 % of the
-// excess, and be found under two conditions if the effect shows under two. Candidates that do as
-// well as the best one within 30 and 5 % of what remains are equivalent to it on this record.
+// excess (10 % between two runs, half beside another of its drive), and be found under two
+// conditions if the effect shows under two. Candidates that do as well as the best one within 30
+// and 5 % of what remains are equivalent to it on this record.
 //
 // What found effects explain is never known better than to half a percent: of what a further effect
 // gains in a channel only that counts which exceeds 0.5 % of what they explain there.

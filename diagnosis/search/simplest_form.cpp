@@ -19,17 +19,11 @@ constexpr double kSameMachine = 1e-3;
 /// what an effect must gain.
 constexpr double kUnneeded = 4, kUnneededPart = 0.25;
 
-/// Whether a number only shapes its effect.
-bool is_shape(const Candidate& candidate, const FreedNumber& n) {
-  return std::any_of(candidate.shape.begin(), candidate.shape.end(),
-                     [&](std::size_t s) { return candidate.numbers[s].key == n.number.key; });
-}
-
 /// Indices of the numbers that say how much of the effect there is.
-std::vector<std::size_t> amplitudes_of(const Candidate& candidate, const AddedEffect& effect) {
+std::vector<std::size_t> amplitudes_of(const AddedEffect& effect) {
   std::vector<std::size_t> all;
   for (std::size_t i = 0; i < effect.numbers.size(); ++i)
-    if (!is_shape(candidate, effect.numbers[i])) all.push_back(i);
+    if (!effect.numbers[i].shape && !is_phase(effect.numbers[i].number)) all.push_back(i);
   return all;
 }
 
@@ -43,13 +37,11 @@ void forget(FittedMachine& m, std::size_t effect, std::size_t number) {
     m.columns.erase(m.columns.begin() + static_cast<std::ptrdiff_t>(column));
 }
 
-void put_back_unneeded(const Evidence& evidence, const Machine& declared,
-                       const std::vector<Candidate>& candidates, double least_cost,
+void put_back_unneeded(const Evidence& evidence, const Machine& declared, double least_cost,
                        FittedMachine& m) {
   for (std::size_t e = 0; e < m.added.size(); ++e) {
-    const Candidate& candidate = candidates[m.added[e].candidate];
     while (true) {
-      const std::vector<std::size_t> amplitudes = amplitudes_of(candidate, m.added[e]);
+      const std::vector<std::size_t> amplitudes = amplitudes_of(m.added[e]);
       if (amplitudes.size() < 2) break;
       const double chi2 = evidence.chi2(m.residual, Role::both);
       double least = least_cost;
@@ -73,7 +65,6 @@ void put_back_unneeded(const Evidence& evidence, const Machine& declared,
 }
 
 void put_back_undetermined(const Evidence& evidence, const Machine& declared,
-                           const std::vector<Candidate>& candidates,
                            const DiagnosisOptions& options, double floor, FittedMachine& m) {
   while (true) {
     const std::map<std::string, Interval> intervals =
@@ -81,8 +72,7 @@ void put_back_undetermined(const Evidence& evidence, const Machine& declared,
     double least = 1;
     std::size_t effect = m.added.size(), number = 0;
     for (std::size_t e = 0; e < m.added.size(); ++e) {
-      const std::vector<std::size_t> amplitudes =
-          amplitudes_of(candidates[m.added[e].candidate], m.added[e]);
+      const std::vector<std::size_t> amplitudes = amplitudes_of(m.added[e]);
       if (amplitudes.size() < 2) continue;
       for (const std::size_t i : amplitudes) {
         const FreedNumber& n = m.added[e].numbers[i];
@@ -104,10 +94,15 @@ void put_back_undetermined(const Evidence& evidence, const Machine& declared,
   }
 }
 
+/// Whether a number is an amplitude of the wave that its effect is.
+bool is_of_wave(const FreedNumber& n) {
+  return !n.shape && !is_phase(n.number) && !has_no_phase(n.number);
+}
+
 /// The numbers of a wave with all amplitudes turned, and the phase by half a period.
 std::vector<FreedNumber> turned(std::vector<FreedNumber> numbers, std::size_t phase) {
   for (FreedNumber& n : numbers)
-    if (!n.shape && !is_phase(n.number) && !has_no_phase(n.number)) n.value = -n.value;
+    if (is_of_wave(n)) n.value = -n.value;
   numbers[phase].value = std::remainder(numbers[phase].value + 180, 360);
   return numbers;
 }
@@ -115,16 +110,14 @@ std::vector<FreedNumber> turned(std::vector<FreedNumber> numbers, std::size_t ph
 void prefer_positive(const Evidence& evidence, FittedMachine& m) {
   for (AddedEffect& a : m.added) {
     std::vector<FreedNumber>& numbers = a.numbers;
-    const auto of_wave = std::find_if(numbers.begin(), numbers.end(),
-                                      [](const FreedNumber& n) { return is_phase(n.number); });
-    if (of_wave == numbers.end()) continue;
-    of_wave->value = std::remainder(of_wave->value, 360);
-    const auto amplitude = std::find_if(numbers.begin(), numbers.end(), [](const FreedNumber& n) {
-      return !n.shape && !is_phase(n.number) && !has_no_phase(n.number);
-    });
+    const auto phase = std::find_if(numbers.begin(), numbers.end(),
+                                    [](const FreedNumber& n) { return is_phase(n.number); });
+    if (phase == numbers.end()) continue;
+    phase->value = std::remainder(phase->value, 360);
+    const auto amplitude = std::find_if(numbers.begin(), numbers.end(), is_of_wave);
     if (amplitude != numbers.end() && amplitude->value < 0) {
       std::vector<FreedNumber> other =
-          turned(numbers, static_cast<std::size_t>(of_wave - numbers.begin()));
+          turned(numbers, static_cast<std::size_t>(phase - numbers.begin()));
       const Prediction same = evidence.predict(with(m.machine, other));
       if (consequence(evidence, same, m.prediction).of_noise < kSameMachine)
         numbers = std::move(other);
@@ -136,11 +129,10 @@ void prefer_positive(const Evidence& evidence, FittedMachine& m) {
 }  // namespace
 
 void bring_to_simplest_form(const Evidence& evidence, const Machine& declared,
-                            const std::vector<Candidate>& candidates,
                             const DiagnosisOptions& options, double floor, FittedMachine& machine) {
-  put_back_unneeded(evidence, declared, candidates,
-                    std::max(kUnneeded, kUnneededPart * options.least_gain), machine);
-  put_back_undetermined(evidence, declared, candidates, options, floor, machine);
+  put_back_unneeded(evidence, declared, std::max(kUnneeded, kUnneededPart * options.least_gain),
+                    machine);
+  put_back_undetermined(evidence, declared, options, floor, machine);
   prefer_positive(evidence, machine);
 }
 

@@ -5,9 +5,6 @@
 //   a wave of a negative amplitude is one of a positive amplitude, half a period on.
 #pragma once
 
-#include <vector>
-
-#include "diagnosis/search/candidate.hpp"
 #include "diagnosis/search/diagnosis_options.hpp"
 #include "diagnosis/search/fitted_machine.hpp"
 
@@ -15,7 +12,6 @@ namespace vcnc {
 
 /// `floor`: chi-square that noise leaves of the held-out laps.
 void bring_to_simplest_form(const Evidence& evidence, const Machine& declared,
-                            const std::vector<Candidate>& candidates,
                             const DiagnosisOptions& options, double floor, FittedMachine& machine);
 
 }  // namespace vcnc

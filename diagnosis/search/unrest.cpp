@@ -11,9 +11,10 @@ constexpr double kMean = 0.021;        // [s]
 constexpr std::size_t kEnough = 1000;  // samples
 
 /// RMS of a signal of an axis less its moving mean while the axis has stood for a while.
-double at_rest(const Record& record, std::size_t axis, const std::vector<double>& series) {
+std::optional<double> at_rest(const Record& record, std::size_t axis,
+                              const std::vector<double>& series) {
   const MeasuredSignal* command = record.find(SignalKind::command, axis);
-  if (!command) return 0;
+  if (!command) return {};
   const std::vector<double>& q = command->value;
   const auto before = static_cast<std::size_t>(kStands / record.period),
              reach = static_cast<std::size_t>(std::max(1.0, 0.5 * kMean / record.period));
@@ -31,13 +32,15 @@ double at_rest(const Record& record, std::size_t axis, const std::vector<double>
     squares += off * off;
     count += 1;
   }
-  return count < static_cast<double>(kEnough) ? 0 : std::sqrt(squares / count);
+  if (count < static_cast<double>(kEnough)) return {};
+  return std::sqrt(squares / count);
 }
 
 /// What laps of a signal differ by while the axis is told to move.
-double in_motion(const Evidence& evidence, std::size_t axis, std::vector<double> series) {
+std::optional<double> in_motion(const Evidence& evidence, std::size_t axis,
+                                std::vector<double> series) {
   const MeasuredSignal* command = evidence.record().find(SignalKind::command, axis);
-  if (!command) return 0;
+  if (!command) return {};
   const std::vector<double>& q = command->value;
   for (std::size_t k = 0; k < series.size(); ++k)
     if (k == 0 || q[k] == q[k - 1]) series[k] = kMissing;
@@ -46,13 +49,19 @@ double in_motion(const Evidence& evidence, std::size_t axis, std::vector<double>
 
 /// Of series that are found by their channel.
 template <class Series>
-std::vector<Unrest> unrest_of(const Evidence& evidence, Series&& series_of) {
+std::vector<Unrest> unrest_of_each(const Evidence& evidence, Series&& series_of) {
   const std::vector<ComparedChannel>& channels = evidence.replica().channels();
   std::vector<Unrest> all;
   for (std::size_t c = 0; c < channels.size(); ++c) {
     const std::size_t axis = channels[c].axis;
     if (!is_of_drive(channels[c], axis)) continue;
-    const std::vector<double>& series = series_of(c);
+    std::vector<double> series = series_of(c);
+    const std::vector<double>& declared = evidence.declared()[c];
+    for (std::size_t k = 0; k < series.size(); ++k) series[k] -= declared[k];
+    for (const LapEvent& e : evidence.events())
+      if (e.axis == axis)
+        std::fill(series.begin() + static_cast<std::ptrdiff_t>(e.begin),
+                  series.begin() + static_cast<std::ptrdiff_t>(e.end), kMissing);
     all.push_back({channels[c], false, in_motion(evidence, axis, series)});
     all.push_back({channels[c], true, at_rest(evidence.record(), axis, series)});
   }
@@ -67,7 +76,7 @@ bool is_of_drive(const ComparedChannel& channel, std::size_t axis) {
 }
 
 std::vector<Unrest> unrest_of(const Evidence& evidence) {
-  return unrest_of(evidence, [&](std::size_t c) -> const std::vector<double>& {
+  return unrest_of_each(evidence, [&](std::size_t c) -> const std::vector<double>& {
     const ComparedChannel& channel = evidence.replica().channels()[c];
     return evidence.record().find(channel.kind, channel.axis)->value;
   });
@@ -78,14 +87,14 @@ HealthyNoise healthy_noise(const Evidence& evidence) {
   const std::vector<ComparedChannel>& channels = evidence.replica().channels();
   for (Unrest& u : healthy.unrest)
     for (std::size_t c = 0; c < channels.size(); ++c)
-      if (channels[c].kind == u.channel.kind && channels[c].axis == u.channel.axis && u.rms > 0)
-        u.rms = std::max(u.rms, evidence.noise().channels[c].rms);
+      if (channels[c] == u.channel && u.rms)
+        u.rms = std::max(*u.rms, evidence.noise().channels[c].rms);
   return healthy;
 }
 
 std::vector<Unrest> unrest_of(const Evidence& evidence, const Prediction& prediction) {
-  return unrest_of(evidence,
-                   [&](std::size_t c) -> const std::vector<double>& { return prediction[c]; });
+  return unrest_of_each(evidence,
+                        [&](std::size_t c) -> const std::vector<double>& { return prediction[c]; });
 }
 
 }  // namespace vcnc

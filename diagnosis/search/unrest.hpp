@@ -1,15 +1,18 @@
 // How restless the drive of an axis is: what its signals do that nobody asked for.
 //
 //   in motion   what laps of one condition differ by while the axis is told to move, RMS
-//   at rest     what is left of a signal less its moving mean over 21 ms while the axis has been
-//   told to
-//               stand for 0.1 s, RMS: a drive that hunts within a gap does so for as long as it
-//               stands
+//   at rest     what is left less its moving mean over 21 ms while the axis has been told to stand
+//               for 0.1 s, RMS: a drive that hunts within a gap does so for as long as it stands
+//
+// Both of what a signal is off the declared machine: laps begin anywhere within a sample, so that
+// the signals themselves differ by that. Without moments that other laps do not share
+// (lap_events.hpp).
 //
 // Validity: an axis of which the position or the force is recorded; a vibration faster than half
 // the rate of the record shows by its strength only.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "diagnosis/search/evidence.hpp"
@@ -19,7 +22,7 @@ namespace vcnc {
 struct Unrest {
   ComparedChannel channel;
   bool at_rest = false;
-  double rms = 0;  ///< [SI]; 0: not known
+  std::optional<double> rms;  ///< [SI]; none where it is not known
 };
 
 /// What was noise when the machine was healthy.
@@ -28,6 +31,7 @@ struct HealthyNoise {
   std::vector<Unrest> unrest;
 };
 
+/// Whether it is the position or the force of an axis.
 bool is_of_drive(const ComparedChannel& channel, std::size_t axis);
 
 /// Of every position and force of a record.

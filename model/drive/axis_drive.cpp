@@ -17,6 +17,15 @@ double observer_bandwidth(const ServoParams& servo) {
   return std::min(kObserverRatio * 2 * kPi * servo.velocity_bandwidth, kFastestObserver);
 }
 
+/// How far a first-order lag comes in one step.
+double share_of(double step, double lag) { return lag > 0 ? -std::expm1(-step / lag) : 1; }
+
+/// What follows a signal so; without a lag the signal itself, to the bit.
+template <class Real>
+Real lagged(const Real& before, const Real& signal, const Real& share) {
+  return choose(share < Real(1), before + share * (signal - before), signal);
+}
+
 }  // namespace
 
 template <class Real>
@@ -104,7 +113,9 @@ AxisDriveOf<Real>::AxisDriveOf(const AxisParams& declared, const AxisParams& act
   kp_ = kp;
   if (actual.servo.controller == ServoParams::Controller::sampled)
     sampled_.emplace(kp, inertia, actual.servo.dead_time, start);
-  lag_share_ = servo.current_lag > 0 ? -std::expm1(-kPlantTime / servo.current_lag) : 1;
+  lag_share_ = share_of(kPlantTime, servo.current_lag);
+  position_share_ = share_of(kDriveLoopTime, actual.servo.position_lag);
+  velocity_share_ = share_of(kDriveLoopTime, actual.servo.velocity_lag);
   TransmissionPort::Signal<double> transmission{.damping_ratio = 0.05};
   axis_chain<TransmissionPort>(effects, axis, seed).step(transmission, {});
   couple(transmission, actual.mechanics.load);
@@ -259,6 +270,7 @@ void AxisDriveOf<Real>::follow_up() {
   const Real measured = encoder(feedback_ == ServoParams::Feedback::motor ? x_motor_ : x_load_);
   const Real told = setpoint_.velocity, seen = observer_.velocity();
   setpoint_ = last_raw_ = last_shaped_ = {measured, choose(abs(seen) < abs(told), seen, told)};
+  position_error_ = 0.0;
 }
 
 template <class Real>
@@ -336,8 +348,10 @@ template <class Real>
 Real AxisDriveOf<Real>::control(const Setpoint& now, const Setpoint& next) {
   using std::max, std::min;
   const Real measured = encoder(feedback_ == ServoParams::Feedback::motor ? x_motor_ : x_load_);
-  const Real v_ref = servo_.kv * (now.position - measured) + servo_.velocity_ff * now.velocity;
-  const Real error = v_ref - observer_.velocity();
+  position_error_ = lagged(position_error_, now.position - measured, position_share_);
+  const Real v_ref = servo_.kv * position_error_ + servo_.velocity_ff * now.velocity;
+  velocity_ = lagged(velocity_, observer_.velocity(), velocity_share_);
+  const Real error = v_ref - velocity_;
   const Real a_c = (next.velocity - now.velocity) / kDriveLoopTime;
   const Real force = kp_ * error + integral_ + servo_.acceleration_ff * inertia_ * a_c;
   const Real limited = min(max(force, -servo_.force_limit), servo_.force_limit);

@@ -5,8 +5,8 @@
 // ends), so that velocity and acceleration feed-forward are smooth.
 //
 // Every 100 us (loop step, T), at its instant t:
-//   v_ref = Kv (x_c - x_m) + kvff v_c
-//   F_ref = Kp (v_ref - v_m) + (Kp/Ti) int (v_ref - v_m) dt + kaff J a_c
+//   v_ref = Kv e + kvff v_c,   e: x_c - x_m behind a first-order lag tau_x
+//   F_ref = Kp (v_ref - v) + (Kp/Ti) int (v_ref - v) dt + kaff J a_c,   v: v_m behind a lag tau_v
 //   |F_ref| <= F_max; the integral is held while the force is limited
 //   Kp    = 2 pi f_v J,  J = load + reflected motor inertia
 //   a_c   = (v_c(t + T) - v_c(t)) / T, the acceleration that the coming step needs on average
@@ -234,7 +234,7 @@ class AxisDriveOf {
   Real inertia_;  ///< what the controller takes it to be
   Real plant_inertia_, motor_inertia_, load_inertia_;
   ServoPort::Signal<Real> servo_;
-  Real kp_{}, lag_share_{};
+  Real kp_{}, lag_share_{}, position_share_{}, velocity_share_{};
   bool two_masses_ = false;
   Real stiffness_{}, damping_{}, half_gap_{};
 
@@ -257,7 +257,7 @@ class AxisDriveOf {
   int plant_step_ = 0;
   double encoder_shift_ = 0;
   Real x_load_, v_load_{}, a_load_{}, x_motor_, v_motor_{};
-  Real force_ref_{}, force_{}, integral_{}, load_force_{};
+  Real position_error_{}, velocity_{}, force_ref_{}, force_{}, integral_{}, load_force_{};
   Setpoint last_raw_, last_shaped_;
   AxisVector told_position_{}, told_velocity_{}, before_position_{}, before_velocity_{};
   PerLane<Real, Motions<double>> motions_{};
@@ -270,8 +270,8 @@ class AxisDriveOf {
         std::tie(setpoint_.position, setpoint_.velocity, inertia_, plant_inertia_, motor_inertia_,
                  load_inertia_, servo_.kv, servo_.velocity_gain, servo_.integral_time,
                  servo_.velocity_ff, servo_.acceleration_ff, servo_.current_lag, servo_.force_limit,
-                 kp_, lag_share_, stiffness_, damping_, half_gap_, x_load_, x_motor_,
-                 last_raw_.position, last_raw_.velocity, last_shaped_.position,
+                 kp_, lag_share_, position_share_, velocity_share_, stiffness_, damping_, half_gap_,
+                 x_load_, x_motor_, last_raw_.position, last_raw_.velocity, last_shaped_.position,
                  last_shaped_.velocity),
         observer_.numbers());
   }

@@ -12,40 +12,60 @@
 
 namespace vcnc {
 
-template <Place place>
-struct IsOfAxis : std::bool_constant<of_axis(place)> {};
-template <Place place>
-struct IsOfMachine : std::bool_constant<!of_axis(place)> {};
+/// Room for one effect; none for one that is kept elsewhere.
+template <class Effect, bool kept>
+struct Slot {
+  Effect effect;
+};
+template <class Effect>
+struct Slot<Effect, false> {};
+
+/// The effects of the list that belong to an axis, or those that do not, each found by its type.
+/// (Bases instead of a std::tuple, which costs a second in each file that includes it.)
+template <bool axis, class List = AllEffects>
+class Slots;
+template <bool axis, class... Effect>
+class Slots<axis, EffectList<Effect...>> : Slot<Effect, of_axis(Effect::place) == axis>... {
+ public:
+  template <class Wanted>
+  Wanted& get() {
+    return static_cast<Slot<Wanted, true>&>(*this).effect;
+  }
+  template <class Wanted>
+  const Wanted& get() const {
+    return static_cast<const Slot<Wanted, true>&>(*this).effect;
+  }
+};
 
 /// Every effect that may sit on an axis; those that do not fit the axis stay null.
 class AxisEffects {
  public:
   template <class Effect>
   Effect& get() {
-    return std::get<Effect>(all_);
+    return all_.get<Effect>();
   }
   template <class Effect>
   const Effect& get() const {
-    return std::get<Effect>(all_);
+    return all_.get<Effect>();
   }
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit, bool rotary) {
-    std::apply([&](auto&... effect) { (field(effect, visit, rotary), ...); }, p.all_);
+    for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
+      constexpr Place place = Effect::place;
+      if constexpr (of_axis(place)) {
+        auto& effect = p.template get<Effect>();
+        if (!fits(place, rotary)) return;
+        if constexpr (place == Place::axis)
+          visit.effect(Effect::text.name, effect, Effect::text.brief.data(), rotary);
+        else
+          visit.effect(Effect::text.name, effect, Effect::text.brief.data());
+      }
+    });
   }
 
  private:
-  template <class Effect, class Visit>
-  static void field(Effect& effect, Visit& visit, bool rotary) {
-    constexpr Place place = Effect::place;
-    if (!fits(place, rotary)) return;
-    if constexpr (place == Place::axis)
-      visit.effect(Effect::text.name, effect, Effect::text.brief.data(), rotary);
-    else
-      visit.effect(Effect::text.name, effect, Effect::text.brief.data());
-  }
-
-  decltype(select_effects<IsOfAxis>(AllEffects())) all_;
+  Slots<true> all_;
 };
 
 /// A declared parameter whose true value is another one: the machine is not as its file says.
@@ -70,11 +90,11 @@ class Effects {
 
   template <class Effect>
   Effect& get() {
-    return std::get<Effect>(machine_);
+    return machine_.get<Effect>();
   }
   template <class Effect>
   const Effect& get() const {
-    return std::get<Effect>(machine_);
+    return machine_.get<Effect>();
   }
 
   /// Copies the effects of one place of the machine.
@@ -91,19 +111,18 @@ class Effects {
       visit.group(kAxisNames[i], p.axis[i], "effects of one axis", is_rotary(i));
     for (const Place place : {Place::geometry, Place::probe, Place::setup, Place::nc})
       visit.section(key_of(place), "effects", [&](auto& table) {
-        std::apply([&](auto&... effect) { (field(effect, table, place), ...); }, p.machine_);
+        for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
+          if constexpr (!of_axis(Effect::place))
+            if (Effect::place == place)
+              table.effect(Effect::text.name, p.template get<Effect>(), Effect::text.brief.data());
+        });
       });
     visit.list("law", p.laws, "any law of the machine's state at one of six points of an axis");
     visit.list("deviation", p.deviations, "a declared parameter whose true value is another one");
   }
 
  private:
-  template <class Effect, class Visit>
-  static void field(Effect& effect, Visit& visit, Place place) {
-    if (Effect::place == place) visit.effect(Effect::text.name, effect, Effect::text.brief.data());
-  }
-
-  decltype(select_effects<IsOfMachine>(AllEffects())) machine_;
+  Slots<false> machine_;
 };
 
 }  // namespace vcnc

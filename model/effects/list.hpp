@@ -4,7 +4,6 @@
 // the order X Y Z A C, and laws (law.hpp) after all of them.
 #pragma once
 
-#include <tuple>
 #include <type_traits>
 
 #include "model/effects/a_axis_offset.hpp"
@@ -134,13 +133,6 @@ void for_each_effect(EffectList<Effect...>, F&& f) {
 template <class F>
 void for_each_effect(F&& f) {
   for_each_effect(AllEffects(), f);
-}
-
-/// The effects whose place satisfies `Is` as a tuple.
-template <template <Place> class Is, class... Effect>
-auto select_effects(EffectList<Effect...>) {
-  return std::tuple_cat(
-      std::conditional_t<Is<Effect::place>::value, std::tuple<Effect>, std::tuple<>>()...);
 }
 
 }  // namespace vcnc

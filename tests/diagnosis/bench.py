@@ -38,10 +38,8 @@ import program
 # Leave no trace that repeats (a noise audit's matter) or none behind the logged command (the NC unit's).
 NOT_REPEATABLE = {"encoder_quantisation", "bus_loss", "bus_jitter", "frame_vibration", "mains_hum", "adc_noise",
                   "sample_jitter", "dropped_samples"}
-NO_HYPOTHESIS = {"bus_latency", "period_slip"}  # told as a command delay; sought by itself: nothing to leave out
 BEFORE_THE_COMMAND = {"corner_cutting", "chord_error", "path_filter"}
 SET_UP = {"piece_offset", "piece_tilt"}  # clamped anew for every run: never a finding
-DECLARED = {"coulomb", "stribeck", "viscous", "presliding", "windup", "surface_friction"}
 S_PIECE = HERE.parents[1] / "configs/pieces/s_eq1.toml"
 MODEL = "found.toml"  # what a diagnosis calls the machine it found
 WHOLE = {"periods", "channel", "delay_cycles", "lobes", "harmonic", "order"}
@@ -158,7 +156,7 @@ def own_scenarios(rng, counts, entries):
                 if not order:
                     order = list(rng.permutation(names))
                 name = order.pop() if number == 1 else str(rng.choice(names))
-                if name not in chosen and not (kind == "without" and name in DECLARED | NO_HYPOTHESIS):
+                if name not in chosen and not (kind == "without" and name in generate.NEVER_LEFT_OUT):
                     chosen.append(name)
             s = {"kind": kind, "effects": [], "values": {}, "number": len(out)}
             assignments = dict(set_up(rng))

@@ -30,16 +30,20 @@ class ProductReplica : public Replica {
   mutable SharedSeries of_load_;
 };
 
-Machine machine(double damping, double squareness) {
+constexpr const char* kDamping = "common:probe.damping_ratio";
+
+/// `common`: how much more damping both runs have.
+Machine machine(double damping, double squareness, double common = 0) {
   Machine m;
   m.probe.damping_ratio = damping;
   m.effects.get<Squareness>().xy = squareness;
+  if (common != 0) move_number(m, kDamping, common);
   return m;
 }
 
 std::vector<FreedNumber> damping_alone() {
   std::vector<FreedNumber> all = common_numbers(machine(0.3, 0));
-  std::erase_if(all, [](const auto& n) { return n.number.key != "probe.damping_ratio"; });
+  std::erase_if(all, [](const auto& n) { return n.number.key != kDamping; });
   return all;
 }
 
@@ -50,31 +54,46 @@ TEST(CommonNumbers, AreWhatHasATolerance) {
   const std::vector<FreedNumber> all = common_numbers(m);
   const auto of = [&](const std::string& key) {
     for (const FreedNumber& n : all)
-      if (n.number.key == key) return n.tolerance;
+      if (n.number.key == "common:" + key) return n.tolerance;
     return 0.0;
   };
   EXPECT_DOUBLE_EQ(of("probe.damping_ratio"), 0.15);
   EXPECT_DOUBLE_EQ(of("axes.Y.current_lag_us"), 60);
   EXPECT_EQ(of("axes.X.current_lag_us"), 0);  // there is none to be wrong about
-  for (const FreedNumber& n : all) EXPECT_TRUE(n.common);
+  EXPECT_EQ(of("axes.X.position_lag_us"), 500);
+  EXPECT_EQ(of("axes.X.velocity_lag_us"), 500);
+  for (const FreedNumber& n : all) EXPECT_TRUE(n.common());
 }
 
 TEST(CommonNumbers, DoNothingAtTheHealthyMachineAndMultiplyWithAChange) {
   ProductReplica inner;
   ReplicaOfChange replica(inner, machine(0.3, 0), damping_alone());
   EXPECT_DOUBLE_EQ(replica.predict(machine(0.3, 0))[0][0], 0.3);
-  EXPECT_NEAR(replica.predict(machine(0.5, 0))[0][0], 0.3, 1e-12);
+  EXPECT_NEAR(replica.predict(machine(0.3, 0, 0.2))[0][0], 0.3, 1e-12);
   // y_now - y_ref = 0.5 * 1.2 - 0.5 of machines that both have 0.5.
-  replica.anchor(machine(0.5, 0.2));
-  EXPECT_NEAR(replica.predict(machine(0.5, 0.2))[0][0] - 0.3, 0.5 * 1.2 - 0.5, 1e-12);
+  replica.anchor(machine(0.3, 0.2, 0.2));
+  EXPECT_NEAR(replica.predict(machine(0.3, 0.2, 0.2))[0][0] - 0.3, 0.5 * 1.2 - 0.5, 1e-12);
   EXPECT_NEAR(replica.predict(machine(0.3, 0.2))[0][0] - 0.3, 0.3 * 0.2, 1e-12);
+}
+
+TEST(CommonNumbers, AreNoneOfTheNumbersOfTheMachine) {
+  // A damping of 0.4 instead of 0.3 in one run alone, beside 0.1 more in both.
+  ProductReplica inner;
+  ReplicaOfChange replica(inner, machine(0.3, 0), damping_alone());
+  replica.anchor(machine(0.4, 0, 0.1));
+  EXPECT_NEAR(replica.predict(machine(0.4, 0, 0.1))[0][0], 0.4, 1e-12);
+  const Machine both = machine(0.4, 0.2, 0.1);
+  EXPECT_DOUBLE_EQ(number_of(both, "probe.damping_ratio"), 0.4);
+  EXPECT_DOUBLE_EQ(number_of(both, kDamping), 0.1);
+  EXPECT_TRUE(without_common(both).effects.deviations.empty());
 }
 
 TEST(CommonNumbers, LeaveSharedWhatTheyDoNotConcern) {
   ProductReplica inner;
   ReplicaOfChange replica(inner, machine(0.3, 0), damping_alone());
-  replica.anchor(machine(0.4, 0.2));
-  const Prediction a = replica.predict(machine(0.4, 0.2)), b = replica.predict(machine(0.4, 0.2));
+  replica.anchor(machine(0.3, 0.2, 0.1));
+  const Machine m = machine(0.3, 0.2, 0.1);
+  const Prediction a = replica.predict(m), b = replica.predict(m);
   EXPECT_TRUE(a[1].shares(b[1]));
   EXPECT_TRUE(a[1].shares(inner.predict(machine(0.3, 0))[1]));
 }

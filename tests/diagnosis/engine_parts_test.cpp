@@ -338,8 +338,7 @@ TEST(Trials, TheAngleOfAWeightIsAPhase) {
 
 TEST(Intervals, KnowThatALawIsKnownToTwoPercentOnly) {
   Record record = toy::commands(400, 4);
-  Machine truth;
-  move_number(truth, "effects.X.load_play.width_um", 5);
+  const Machine truth = toy::machine({{"effects.X.load_play.width_um", 5}});
   toy::measure(record, truth, 3);
   toy::ToyReplica replica(record);
   Evidence evidence(record, replica, Machine());
@@ -399,8 +398,7 @@ class Askew : public Replica {
 
 TEST(FittedMachine, IsJudgedWhereTheReplicaIsExact) {
   Record record = toy::commands(400, 4);
-  Machine truth;
-  move_number(truth, "axes.X.load_kg", 515);
+  const Machine truth = toy::machine({{"axes.X.load_kg", 515}});
   toy::measure(record, truth, 3);
   const std::string key = "axes.X.load_kg";
   const auto fitted = [&](Replica& replica) {
@@ -421,10 +419,10 @@ TEST(Intervals, CoverTheTruthAsOftenAsTheySay) {
   int inside = 0, numbers = 0;
   for (std::uint64_t seed = 1000; seed < 1050; ++seed) {
     Record record = toy::commands(400, 4);
-    Machine truth;
-    move_number(truth, "effects.X.scale_error.error_ppm", 20);
-    move_number(truth, "effects.X.load_play.width_um", 1);
-    move_number(truth, "axes.X.load_kg", 500 * (1 + 0.01 * gaussian_noise(seed, 77, 0)[0]));
+    const Machine truth =
+        toy::machine({{"effects.X.scale_error.error_ppm", 20},
+                      {"effects.X.load_play.width_um", 1},
+                      {"axes.X.load_kg", 500 * (1 + 0.01 * gaussian_noise(seed, 77, 0)[0])}});
     toy::measure(record, truth, seed);
     toy::ToyReplica replica(record);
     Evidence evidence(record, replica, Machine());

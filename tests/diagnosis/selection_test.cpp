@@ -14,7 +14,7 @@ std::string names(const SelectionResult& result, const std::vector<Candidate>& c
     all += name;
   };
   for (const AddedEffect& a : result.found.added) add(candidates[a.candidate].name());
-  for (const std::string& key : result.found.released) add(key);
+  for (const ReleasedNumber& r : result.found.released) add(r.key);
   return all;
 }
 
@@ -49,8 +49,7 @@ TEST(Selection, NamesEveryEffectOfTheToyMachine) {
         Injected{"effects.geometry.squareness.xy_urad", 6, "geometry.squareness"},
         Injected{"axes.X.load_kg", 545, "axes.X.load_kg"}}) {
     Record record = toy::commands(1000, 4);
-    Machine truth;
-    move_number(truth, i.key, i.value);
+    const Machine truth = toy::machine({{i.key, i.value}});
     toy::measure(record, truth, 7);
     const SelectionResult result = search(record, Machine());
     EXPECT_EQ(names(result, toy::candidates()), i.found) << i.key;
@@ -60,10 +59,9 @@ TEST(Selection, NamesEveryEffectOfTheToyMachine) {
 
 TEST(Selection, FindsPeriodAndPhaseOfAWave) {
   Record record = toy::commands(1000, 4);
-  Machine truth;
-  move_number(truth, "effects.X.pitch_periodic.amplitude_um", 0.5);
-  move_number(truth, "effects.X.pitch_periodic.period_mm", 7.3);
-  move_number(truth, "effects.X.pitch_periodic.phase_deg", 130);
+  const Machine truth = toy::machine({{"effects.X.pitch_periodic.amplitude_um", 0.5},
+                                      {"effects.X.pitch_periodic.period_mm", 7.3},
+                                      {"effects.X.pitch_periodic.phase_deg", 130}});
   toy::measure(record, truth, 3);
   const SelectionResult result = search(record, Machine());
   ASSERT_EQ(names(result, toy::candidates()), "X.pitch_periodic");
@@ -87,10 +85,9 @@ TEST(Selection, AccusesNoCleanMachine) {
 
 TEST(Selection, FindsThreeEffectsTogether) {
   Record record = toy::commands(1000, 4);
-  Machine truth;
-  move_number(truth, "effects.X.command_delay.delay_ms", 0.02);
-  move_number(truth, "effects.X.load_play.width_um", 1);
-  move_number(truth, "effects.geometry.squareness.xy_urad", 20);
+  const Machine truth = toy::machine({{"effects.X.command_delay.delay_ms", 0.02},
+                                      {"effects.X.load_play.width_um", 1},
+                                      {"effects.geometry.squareness.xy_urad", 20}});
   toy::measure(record, truth, 11);
   const SelectionResult result = search(record, Machine());
   EXPECT_EQ(result.found.added.size(), 3U) << names(result, toy::candidates());
@@ -98,8 +95,7 @@ TEST(Selection, FindsThreeEffectsTogether) {
 
 TEST(Selection, OfEqualsTakesTheOneOfUsualSize) {
   Record record = toy::commands(1000, 4);
-  Machine truth;
-  move_number(truth, "effects.X.load_play.width_um", 1);
+  const Machine truth = toy::machine({{"effects.X.load_play.width_um", 1}});
   toy::measure(record, truth, 12);
   toy::ToyReplica replica(record);
   const Machine declared;
@@ -118,9 +114,9 @@ TEST(Selection, OfEqualsTakesTheOneOfUsualSize) {
 
 TEST(Selection, WhatIsFoundIsNotKnownWellEnoughForAnEffectBehindIt) {
   Record record = toy::commands(1000, 4);
-  Machine truth;
-  move_number(truth, "effects.X.load_play.width_um", 20);
-  move_number(truth, "effects.geometry.squareness.xy_urad", 6);  // 0.05 % of the chi-square
+  const double little = 6;  // 0.05 % of the chi-square
+  const Machine truth = toy::machine(
+      {{"effects.X.load_play.width_um", 20}, {"effects.geometry.squareness.xy_urad", little}});
   toy::measure(record, truth, 13);
   toy::ToyReplica replica(record);
   const Machine declared;
@@ -136,9 +132,8 @@ TEST(Selection, WhatIsFoundIsNotKnownWellEnoughForAnEffectBehindIt) {
 
 TEST(Selection, EndsAtTheMostEffectsThatAreAllowed) {
   Record record = toy::commands(1000, 4);
-  Machine truth;
-  move_number(truth, "effects.X.load_play.width_um", 2);
-  move_number(truth, "effects.geometry.squareness.xy_urad", 20);
+  const Machine truth = toy::machine(
+      {{"effects.X.load_play.width_um", 2}, {"effects.geometry.squareness.xy_urad", 20}});
   toy::measure(record, truth, 15);
   toy::ToyReplica replica(record);
   Evidence evidence(record, replica, {});
@@ -193,9 +188,8 @@ TEST(Selection, StandInsForEachOtherAllGo) {
                        {"effects.Y.load_play.width_um", {0, 1, 0, 0}},      // b
                        {"effects.Z.load_play.width_um", {1, 0.3, 0.1, 0}},  // first
                        {"effects.X.lost_motion.compliance_nm_per_N", {0, 1, -0.05, 0.02}}});
-  Machine truth;
-  move_number(truth, "effects.X.load_play.width_um", 1);
-  move_number(truth, "effects.Y.load_play.width_um", 1);
+  const Machine truth =
+      toy::machine({{"effects.X.load_play.width_um", 1}, {"effects.Y.load_play.width_um", 1}});
   read(record, replica, truth, 14);
   Evidence evidence(record, replica, {});
   DiagnosisOptions options;
@@ -242,9 +236,8 @@ class RattlingReplica : public Replica {
 TEST(Selection, LooksAgainAtADriveAtWhichSomethingWasFound) {
   Record record = toy::commands(1000, 4);
   RattlingReplica replica(record.samples());
-  Machine truth;
-  move_number(truth, RattlingReplica::kFriction, 2);
-  move_number(truth, RattlingReplica::kPlay, 0.5);
+  const Machine truth =
+      toy::machine({{RattlingReplica::kFriction, 2}, {RattlingReplica::kPlay, 0.5}});
   read(record, replica, truth, 16);
   Evidence evidence(record, replica, {});
   const SelectionResult result =
@@ -276,9 +269,8 @@ TEST(Selection, ADeclaredNumberThatStoodForEffectsGetsItsToleranceBack) {
   Record record = toy::commands(1000, 4);
   WavesAndMass replica(record.samples(), {{"effects.X.load_play.width_um", {1, 0}},
                                           {"effects.Y.load_play.width_um", {0, 1}}});
-  Machine truth;
-  move_number(truth, "effects.X.load_play.width_um", 50);
-  move_number(truth, "effects.Y.load_play.width_um", 40);
+  const Machine truth =
+      toy::machine({{"effects.X.load_play.width_um", 50}, {"effects.Y.load_play.width_um", 40}});
   read(record, replica, truth, 17);
   Evidence evidence(record, replica, {});
   const SelectionResult result = select_effects_of(evidence, {}, replica.candidates(), {}, {});
@@ -297,9 +289,7 @@ TEST(Selection, ADeclaredNumberTakesThePlaceOfAnEffectThatStoodForIt) {
   WavesAndMass replica(record.samples(), {{first.c_str(), {1, 1, 0.3, 0, 0}},
                                           {part.c_str(), {0, 0, 0, 1, 0}},
                                           {y.c_str(), {0, 0, 0, 1, 0.5}}});
-  Machine truth;
-  move_number(truth, WavesAndMass::kMass, 800);
-  move_number(truth, y, 12);
+  const Machine truth = toy::machine({{WavesAndMass::kMass, 800}, {y, 12}});
   read(record, replica, truth, 19);
   Evidence evidence(record, replica, {});
   const std::vector<Candidate> all{{"first", "", {{first, 1, 0, 1000}, {part, 1, 0, 1000}}, {}},
@@ -317,9 +307,8 @@ TEST(Selection, BesideAnotherOfItsDriveAnEffectMustExplainMoreOfWhatIsLeft) {
   Record record = toy::commands(1000, 4);
   WaveReplica replica(record.samples(), {{"effects.X.load_play.width_um", {1, 0}},
                                          {"effects.X.backlash.gap_um", {0, 1}}});
-  Machine truth;
-  move_number(truth, "effects.X.load_play.width_um", 3);
-  move_number(truth, "effects.X.backlash.gap_um", 1);
+  const Machine truth =
+      toy::machine({{"effects.X.load_play.width_um", 3}, {"effects.X.backlash.gap_um", 1}});
   read(record, replica, truth, 18);
   std::vector<double>& reading = record.signals.back().value;
   for (std::size_t k = 0; k < reading.size(); ++k)
@@ -327,15 +316,18 @@ TEST(Selection, BesideAnotherOfItsDriveAnEffectMustExplainMoreOfWhatIsLeft) {
   std::vector<Candidate> all = replica.candidates();
   const std::string x = "X", y = "Y";
   for (const std::string& place : {x, y})
-    for (const double share : {0.1, 0.5}) {
-      for (Candidate& c : all) c.family = Family::mechanics, c.place = x;
-      all[1].place = place;
-      Evidence evidence(record, replica, {});
-      DiagnosisOptions options;
-      options.share_beside = share;
-      const SelectionResult result = select_effects_of(evidence, {}, all, options, {});
-      EXPECT_EQ(result.found.added.size(), place == x && share == 0.5 ? 1U : 2U) << place;
-    }
+    for (const Family first : {Family::mechanics, Family::geometry})
+      for (const double share : {0.1, 0.5}) {
+        for (Candidate& c : all) c.family = Family::mechanics, c.place = x;
+        all[0].family = first;
+        all[1].place = place;
+        Evidence evidence(record, replica, {});
+        DiagnosisOptions options;
+        options.share_beside = share;
+        const SelectionResult result = select_effects_of(evidence, {}, all, options, {});
+        const bool beside = place == x && first == Family::mechanics;
+        EXPECT_EQ(result.found.added.size(), beside && share == 0.5 ? 1U : 2U) << place;
+      }
 }
 
 TEST(Selection, ManyThatDoALittleEachAreNotTold) {

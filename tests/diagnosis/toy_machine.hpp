@@ -4,6 +4,8 @@
 
 #include <array>
 #include <cmath>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/records/record.hpp"
@@ -94,6 +96,13 @@ class ToyReplica : public Replica {
   const Record& commands_;
   std::vector<ComparedChannel> channels_;
 };
+
+/// The declared machine with other numbers: key and value, in the unit of the key.
+inline Machine machine(const std::vector<std::pair<std::string, double>>& numbers) {
+  Machine m;
+  for (const auto& [key, value] : numbers) move_number(m, key, value);
+  return m;
+}
 
 /// What `truth` would have measured, with white noise.
 inline void measure(Record& record, const Machine& truth, std::uint64_t seed) {

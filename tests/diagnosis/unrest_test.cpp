@@ -9,9 +9,9 @@
 namespace vcnc {
 namespace {
 
-constexpr std::size_t kMoves = 1000, kStands = 1000, kLaps = 6;
+constexpr std::size_t kMoves = 8000, kStands = 1000, kLaps = 6;
 
-/// X to and fro in a second, and then a second at rest.
+/// X to and fro in 8 s, and then a second at rest.
 Record to_and_fro() {
   Record record;
   record.source = "toy";
@@ -28,6 +28,16 @@ Record to_and_fro() {
   return record;
 }
 
+constexpr double kUnknown = -1;
+
+/// Of one signal of X, in motion and at rest.
+std::pair<double, double> of_signal(const std::vector<Unrest>& all, SignalKind kind) {
+  std::pair<double, double> rms{kUnknown, kUnknown};
+  for (const Unrest& u : all)
+    if (u.channel.kind == kind) (u.at_rest ? rms.second : rms.first) = u.rms.value_or(kUnknown);
+  return rms;
+}
+
 /// Of the force of X, where `more` is added to the noise at every sample of a lap.
 template <class F>
 std::pair<double, double> in_motion_and_at_rest(F&& more) {
@@ -39,10 +49,7 @@ std::pair<double, double> in_motion_and_at_rest(F&& more) {
         s.value[k] += more(k, k % (kMoves + kStands) >= kMoves);
   toy::ToyReplica replica(record);
   const Evidence evidence(record, replica, {});
-  std::pair<double, double> rms;
-  for (const Unrest& u : unrest_of(evidence))
-    if (u.channel.kind == SignalKind::force) (u.at_rest ? rms.second : rms.first) = u.rms;
-  return rms;
+  return of_signal(unrest_of(evidence), SignalKind::force);
 }
 
 double wave(std::size_t k, double hertz) {
@@ -86,18 +93,61 @@ TEST(Unrest, OfAHealthyRunIsNoLessThanAReplicaIsExact) {
     for (MeasuredSignal& s : record.signals)
       if (s.kind == channel.kind)
         for (std::size_t k = 0; k < s.value.size(); ++k)
-          s.value[k] = exact[c][k] * (1 + 1e-12 * gaussian_noise(23, c, k)[0]) +
-                       1e-15 * gaussian_noise(24, c, k)[0];
+          s.value[k] = exact[c][k] * (1 + 1e-12 * gaussian_noise(23, c, k)[0]);
   }
   const Evidence evidence(record, replica, {});
-  std::size_t known = 0;
-  for (const Unrest& u : healthy_noise(evidence).unrest) {
-    known += u.rms > 0;
-    if (u.rms > 0) {
-      EXPECT_GE(u.rms, u.channel.kind == SignalKind::force ? 1e-6 : 1e-9);
-    }
+  for (const SignalKind kind : {SignalKind::position, SignalKind::force}) {
+    const double least = kind == SignalKind::force ? 1e-6 : 1e-9;
+    // At rest, where nothing moves at all, too.
+    const auto [motion, rest] = of_signal(healthy_noise(evidence).unrest, kind);
+    EXPECT_GE(motion, least);
+    EXPECT_GE(rest, least);
+    EXPECT_LT(of_signal(unrest_of(evidence), kind).second, least);
   }
-  EXPECT_EQ(known, 4U);  // position and force, in motion and at rest
+}
+
+TEST(Unrest, IsNotKnownOfAnAxisThatNeverStands) {
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, {}, 25);
+  toy::ToyReplica replica(record);
+  const Evidence evidence(record, replica, {});
+  const auto [motion, rest] = of_signal(unrest_of(evidence), SignalKind::force);
+  EXPECT_NEAR(motion, toy::kForceNoise, 0.05 * toy::kForceNoise);
+  EXPECT_EQ(rest, kUnknown);
+}
+
+TEST(Unrest, LapsMayBeginAnywhereWithinASample) {
+  // Laps of 999.6 samples: the same position is 17 um off at most from one to the next.
+  Record record;
+  record.source = "toy";
+  constexpr double kLap = 999.6;
+  const auto samples = static_cast<std::size_t>(kLaps * kLap);
+  std::vector<double> x, y(samples, 0.0);
+  for (std::size_t k = 0; k < samples; ++k)
+    x.push_back(0.01 * std::cos(2 * kPi * static_cast<double>(k) / kLap));
+  for (std::size_t lap = 0; lap < kLaps; ++lap) {
+    const auto at = static_cast<std::size_t>(std::round(static_cast<double>(lap) * kLap));
+    record.stretches.push_back({at, std::min(at + 999, samples), 0, static_cast<int>(lap), ""});
+  }
+  record.signals.push_back({SignalKind::command, 0, "qx", x, 0});
+  record.signals.push_back({SignalKind::command, 1, "qy", y, 0});
+  toy::measure(record, {}, 26);
+  toy::ToyReplica replica(record);
+  const Evidence evidence(record, replica, {});
+  EXPECT_NEAR(of_signal(unrest_of(evidence), SignalKind::position).first, toy::kPositionNoise,
+              0.05 * toy::kPositionNoise);
+}
+
+TEST(Unrest, IsNotAMomentThatOtherLapsDoNotShare) {
+  // An axis that breaks away once more in its third lap.
+  const auto [motion, rest] = in_motion_and_at_rest([](std::size_t k, bool at_rest) {
+    const std::size_t in_lap = k % (kMoves + kStands);
+    return k / (kMoves + kStands) == 2 && !at_rest && in_lap > 480 && in_lap < 520
+               ? 1000 * toy::kForceNoise
+               : 0.0;
+  });
+  EXPECT_LT(motion, 1.5 * toy::kForceNoise);
+  EXPECT_LT(rest, 1.5 * toy::kForceNoise);
 }
 
 }  // namespace

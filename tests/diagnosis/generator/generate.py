@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Draws machines with what is wrong with them, simulates them and writes what a diagnosis is given.
 
-    generate.py VCNC OUT [--seed N] [--kinds clean=8,single=20,pair=4,triple=2,unknown=8,without=4] [--individuals 4]
+    generate.py VCNC OUT [--seed N] [--kinds clean=8,single=20,pair=4,triple=2,unknown=8] [--individuals 4]
 
 OUT gets machine.toml (declared), piece.toml, program.ngc, map.toml, reference_I.csv (a healthy recording of
 individual I), test_K.csv, and answer_K.json: which reference belongs to it and what was done. The
@@ -84,18 +84,18 @@ def scenarios(rng, counts, individuals, names=None):
     """Single effects go through the library in a drawn order before any comes twice; so do those that the diagnosis is
     not to know of ("without")."""
     names = sorted(names or effects.EFFECTS)
-    order = []
+    drawn_from = {"single": names, "without": [n for n in names if n not in NEVER_LEFT_OUT]}
+    order = {kind: [] for kind in drawn_from}
     out = []
     for kind, count in counts.items():
         for _ in range(count):
             s = {"kind": kind, "individual": int(rng.integers(individuals)), "effects": []}
-            if kind in ("single", "without"):
-                while not s["effects"]:
-                    if not order:
-                        order = list(rng.permutation(names))
-                    if (name := order.pop()) in NEVER_LEFT_OUT and kind == "without":
-                        continue
-                    s["effects"] = draw_effects(rng, 1, [name])
+            if kind in drawn_from:
+                if not drawn_from[kind]:
+                    raise SystemExit(f"--effects: {', '.join(names)}: none that can be left out of the library")
+                if not order[kind]:
+                    order[kind] = list(rng.permutation(drawn_from[kind]))
+                s["effects"] = draw_effects(rng, 1, [order[kind].pop()])
             elif kind in ("pair", "triple"):
                 s["effects"] = draw_effects(rng, {"pair": 2, "triple": 3}[kind], names)
             s["values"] = true_values(s["effects"])
