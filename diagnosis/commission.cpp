@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "diagnosis/diagnose.hpp"
@@ -13,14 +14,54 @@
 namespace vcnc {
 namespace {
 
-/// A machine with the effects of these names at one axis in its fit, started at what is declared of
-/// them; those it has not yet.
-FittedMachine with_effects(const DiagnosisCase& of, const FittedMachine& machine, std::size_t axis,
-                           const std::vector<std::string>& effects) {
+/// Numbers that are fitted together: effects of an axis, or its lags.
+struct Step {
+  std::string name;
+  std::vector<std::string> effects;
+};
+
+/// The simplest that does best is taken.
+const std::vector<Step> kFrictionLaws{
+    {"dry and viscous friction", {"coulomb", "viscous"}},
+    {"dry, viscous and break-away friction", {"coulomb", "viscous", "stribeck"}},
+    {"dry and viscous friction with pre-sliding", {"coulomb", "viscous", "presliding"}},
+    {"dry, viscous and break-away friction with pre-sliding",
+     {"coulomb", "viscous", "stribeck", "presliding"}}};
+/// One after the other, the best first.
+const std::vector<Step> kGains{{"kv_error", {"kv_error"}},
+                               {"velocity_ff_error", {"velocity_ff_error"}},
+                               {"acceleration_ff_error", {"acceleration_ff_error"}},
+                               {"velocity_gain_error", {"velocity_gain_error"}},
+                               {"integral_time_error", {"integral_time_error"}},
+                               {"lag of the position loop", {"position_lag_us"}},
+                               {"lag of the measured velocity", {"velocity_lag_us"}}};
+
+/// Of a cascade, no effect of the library: every one has them.
+std::vector<Candidate> lags(const Machine& declared) {
+  std::vector<Candidate> all;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    for (const std::string key : {"position_lag_us", "velocity_lag_us"})
+      if (declared.axes[axis].servo.controller == ServoParams::Controller::cascade)
+        all.push_back({.effect = key,
+                       .place = std::string(kAxisNames[axis]),
+                       .numbers = {{.key = fmt::format("axes.{}.{}", kAxisNames[axis], key),
+                                    .typical = 100,
+                                    .min = 0,
+                                    .max = 5000,
+                                    .one_sided = true}},
+                       .shape = {},
+                       .family = Family::servo});
+  return all;
+}
+
+/// A machine with these effects of one axis in its fit, started at what is declared of them; those
+/// it has not yet.
+FittedMachine with_effects(const std::vector<Candidate>& candidates, const FittedMachine& machine,
+                           std::size_t axis, const std::vector<std::string>& effects) {
   FittedMachine more = machine;
   for (const std::string& effect : effects) {
-    for (std::size_t c = 0; c < of.candidates.size(); ++c) {
-      const Candidate& candidate = of.candidates[c];
+    for (std::size_t c = 0; c < candidates.size(); ++c) {
+      const Candidate& candidate = candidates[c];
       if (candidate.effect != effect || candidate.place != kAxisNames[axis]) continue;
       AddedEffect added{.candidate = c};
       for (std::size_t i = 0; i < candidate.numbers.size(); ++i) {
@@ -41,6 +82,15 @@ FittedMachine with_effects(const DiagnosisCase& of, const FittedMachine& machine
   return more;
 }
 
+/// What was added goes along with every further fit, by its sensitivities.
+void rest(FittedMachine& m) {
+  const std::vector<FreedNumber> numbers = m.numbers();
+  m.nuisances.numbers.insert(m.nuisances.numbers.end(), numbers.begin(), numbers.end());
+  m.nuisances.columns.insert(m.nuisances.columns.end(), m.columns.begin(), m.columns.end());
+  m.added.clear();
+  m.columns.clear();
+}
+
 /// Whether an axis is told to move at all.
 bool is_driven(const Record& record, std::size_t axis) {
   const MeasuredSignal* command = record.find(SignalKind::command, axis);
@@ -53,54 +103,63 @@ bool is_driven(const Record& record, std::size_t axis) {
 
 Commissioning commission(const DiagnosisCase& of, const DiagnosisOptions& options,
                          const KeepGoing& keep_going) {
-  struct FrictionLaw {
-    const char* name;
-    std::vector<std::string> effects;
-  };
-  static const std::vector<FrictionLaw> laws{
-      {"dry and viscous friction", {"coulomb", "viscous"}},
-      {"dry, viscous and break-away friction", {"coulomb", "viscous", "stribeck"}},
-      {"dry and viscous friction with pre-sliding", {"coulomb", "viscous", "presliding"}},
-      {"dry, viscous and break-away friction with pre-sliding",
-       {"coulomb", "viscous", "stribeck", "presliding"}}};
-  static const std::vector<std::string> gains{"kv_error", "velocity_ff_error",
-                                              "acceleration_ff_error", "velocity_gain_error",
-                                              "integral_time_error"};
+  std::vector<Candidate> all = of.candidates;
+  for (Candidate& lag : lags(of.declared)) all.push_back(std::move(lag));
   Evidence evidence(of.record, of.replica, of.declared);
   FittedMachine machine = fit_declared(evidence, of.declared);
   Commissioning result;
+  std::vector<AddedEffect> found;
+  bool going = true;
+  const auto go = [&](std::size_t axis) {
+    going = !keep_going || keep_going({fmt::format("friction and gains of {}", kAxisNames[axis]),
+                                       static_cast<double>(axis) / kAxisCount});
+    return going;
+  };
+  const auto fitted = [&](const std::vector<Step>& steps, std::size_t axis) {
+    std::vector<FittedMachine> trials(steps.size(), machine);
+    evidence.each_together(steps.size(), [&](std::size_t i) {
+      trials[i] = with_effects(all, machine, axis, steps[i].effects);
+      if (trials[i].added.size() > machine.added.size()) converge(evidence, trials[i]);
+    });
+    return trials;
+  };
   const double per_sample = 1 / std::max(1.0, evidence.count(Role::held_out));
+  const auto accept = [&](FittedMachine best, std::size_t axis, const std::string& chosen) {
+    result.notes.push_back(fmt::format("{}: {}, chi-square per held-out sample {:.3g} -> {:.3g}",
+                                       kAxisNames[axis], chosen, machine.held_out * per_sample,
+                                       best.held_out * per_sample));
+    machine = std::move(best);
+  };
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    if (keep_going && !keep_going({fmt::format("friction and gains of {}", kAxisNames[axis]),
-                                   static_cast<double>(axis) / kAxisCount}))
-      break;
     if (!is_driven(of.record, axis)) continue;
-    const auto fitted = [&](const std::vector<std::string>& effects) {
-      FittedMachine trial = with_effects(of, machine, axis, effects);
-      if (trial.added.size() > machine.added.size()) converge(evidence, trial);
-      return trial;
-    };
-    const auto accept = [&](FittedMachine best, const std::string& chosen) {
-      if (best.added.size() > machine.added.size())
-        result.notes.push_back(
-            fmt::format("{}: {}, chi-square per held-out sample {:.3g} -> {:.3g}", kAxisNames[axis],
-                        chosen, machine.held_out * per_sample, best.held_out * per_sample));
-      machine = std::move(best);
-    };
-    FittedMachine best = machine;
-    std::string chosen;
-    for (const FrictionLaw& law : laws) {
-      FittedMachine trial = fitted(law.effects);
-      if (best.held_out - trial.held_out <= options.least_gain) continue;
-      best = std::move(trial);
-      chosen = law.name;
+    if (!go(axis)) break;
+    std::vector<FittedMachine> trials = fitted(kFrictionLaws, axis);
+    std::size_t law = trials.size();
+    for (std::size_t i = 0; i < trials.size(); ++i)
+      if ((law < trials.size() ? trials[law] : machine).held_out - trials[i].held_out >
+          options.least_gain)
+        law = i;
+    if (law < trials.size()) accept(std::move(trials[law]), axis, kFrictionLaws[law].name);
+    for (std::vector<Step> gains = kGains; !gains.empty() && go(axis);) {
+      trials = fitted(gains, axis);
+      const auto best =
+          std::min_element(trials.begin(), trials.end(),
+                           [](const auto& x, const auto& y) { return x.held_out < y.held_out; });
+      if (machine.held_out - best->held_out <= options.least_gain) break;
+      const auto gain = gains.begin() + (best - trials.begin());
+      accept(std::move(*best), axis, gain->name);
+      gains.erase(gain);
     }
-    accept(std::move(best), chosen);
-    for (const std::string& gain : gains) {
-      FittedMachine trial = fitted({gain});
-      if (machine.held_out - trial.held_out > options.least_gain) accept(std::move(trial), gain);
-    }
+    found.insert(found.end(), machine.added.begin(), machine.added.end());
+    rest(machine);
+    if (!going) break;
   }
+  // All together, where they have come to.
+  machine.added = std::move(found);
+  machine.nuisances = without(machine.nuisances, machine.numbers());
+  for (AddedEffect& a : machine.added) take_values(a.numbers, machine.machine);
+  anchor_at(evidence, machine);
+  converge(evidence, machine);
   const std::map<std::string, Interval> intervals = intervals_of(evidence, machine);
   const auto tell = [&](const FreedNumber& n) {
     const auto i = intervals.find(n.number.key);

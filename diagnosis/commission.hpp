@@ -21,8 +21,8 @@ struct Commissioning {
 
 /// Fits declared numbers within their tolerances and, axis by axis, the simplest friction law that
 /// does best on held-out data: none, dry and viscous, with break-away, with pre-sliding, with both;
-/// then gains of its loops and feed-forwards, one after the other, where held-out data ask for
-/// them.
+/// then gains of its loops, feed-forwards and lags, the best first, where held-out data ask for
+/// them; at last all axes together.
 Commissioning commission(const DiagnosisCase& of, const DiagnosisOptions& options = {},
                          const KeepGoing& keep_going = {});
 

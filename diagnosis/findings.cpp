@@ -167,19 +167,14 @@ class Report {
       e.contour_error_um = consequence(evidence_, found().prediction, less).contour_um;
       if (negligible(e, without, less)) continue;
       e.acquisition = of_measurement(e.name);
-      for (const std::size_t other : a.class_with)
-        e.class_with.push_back(of_.candidates[other].name());
-      if (!a.class_with.empty()) {
-        e.separating_program = program_for(of_.candidates[a.class_with.front()].effect);
-        if (e.separating_program.empty()) e.separating_program = program_for(e.name);
-      }
+      tell_class(e, a.class_with);
       d_.effects.push_back(std::move(e));
     }
     for (const FreedNumber& n : found().nuisances.numbers) {
       const std::string& key = n.number.key;
-      if (std::none_of(found().released.begin(), found().released.end(),
-                       [&](const ReleasedNumber& r) { return r.key == key; }))
-        continue;
+      const auto released = std::find_if(found().released.begin(), found().released.end(),
+                                         [&](const ReleasedNumber& r) { return r.key == key; });
+      if (released == found().released.end()) continue;
       FoundEffect e;
       e.name = "deviation";
       e.place = key;
@@ -197,8 +192,16 @@ class Report {
       if (negligible(e, without, less)) continue;
       const FittedMachine held = found().holding(key, selection_.base);
       e.gain = Ground(evidence_, held.residual, held.linear()).held_out - found().held_out;
+      tell_class(e, released->class_with);
       d_.effects.push_back(std::move(e));
     }
+  }
+
+  void tell_class(FoundEffect& e, const std::vector<std::size_t>& others) const {
+    for (const std::size_t other : others) e.class_with.push_back(of_.candidates[other].name());
+    if (others.empty()) return;
+    e.separating_program = program_for(of_.candidates[others.front()].effect);
+    if (e.separating_program.empty()) e.separating_program = program_for(e.name);
   }
 
   /// An effect that the finished fit can do without, since the declared numbers do as well.

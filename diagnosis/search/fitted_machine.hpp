@@ -26,7 +26,8 @@ struct AddedEffect {
 /// A declared number found out of tolerance.
 struct ReleasedNumber {
   std::string key;
-  Explained explained{};  ///< as of an effect, with its tolerance
+  Explained explained{};                  ///< as of an effect, with its tolerance
+  std::vector<std::size_t> class_with{};  ///< candidates that do as well
 };
 
 /// A machine by hypothesis with all that was computed at it.

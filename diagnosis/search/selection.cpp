@@ -263,7 +263,7 @@ class Search {
     if (!best.released.empty()) {
       for (FreedNumber& n : m.nuisances.numbers)
         if (n.number.key == best.released) n.tolerance = 0;
-      m.released.push_back({best.released, explained});
+      m.released.push_back({best.released, explained, equivalent});
       add_common(evidence_, m, options_.common);
       converge(evidence_, m);
       settle_in(evidence_, m);
@@ -352,25 +352,32 @@ class Search {
     return less;
   }
 
-  /// Effects that were accepted when others were still missing may be stand-ins: each is taken out
-  /// and all candidates compete for its place, with those common numbers that it had.
+  /// What was accepted when other things were still missing may be a stand-in: each effect is taken
+  /// out, each released number held again, and all candidates and declared numbers compete for the
+  /// place, with those common numbers that it had.
   void exchange(FittedMachine& m) {
-    std::size_t tries = 2 * m.added.size();
-    for (std::size_t i = 0; i < m.added.size() && m.found() > 1 && tries-- > 0 && going_;) {
-      const FittedMachine less = taken_out(m, i, Common::free);
+    std::size_t tries = 2 * m.found();
+    for (std::size_t i = 0; i < m.found() && m.found() > 1 && tries-- > 0 && going_;) {
+      AddedEffect* effect = i < m.added.size() ? &m.added[i] : nullptr;
+      ReleasedNumber* number = effect ? nullptr : &m.released[i - m.added.size()];
+      FittedMachine less =
+          effect ? taken_out(m, i, Common::free) : m.holding(number->key, result_.base);
       Contest contest(rules_, less);
-      AddedEffect& present = m.added[i];
       const double lost = contest.held_out() - m.held_out;
-      const std::vector<Contender> rivals = contest.rivals(kNearLoss * lost, present.candidate);
-      present.class_with.clear();
+      std::vector<Contender> rivals =
+          contest.rivals(kNearLoss * lost, effect ? effect->candidate : candidates_.size());
+      if (number)
+        std::erase_if(rivals, [&](const Contender& r) { return r.released == number->key; });
+      std::vector<std::size_t>& alike = effect ? effect->class_with : number->class_with;
+      alike.clear();
       for (const Contender& r : rivals)
         if (r.released.empty() && r.gain > std::max(lost - contest.band_of(lost), 0.5 * lost))
-          present.class_with.push_back(r.candidate);
-      const double worth = lost - 4 * static_cast<double>(present.numbers.size()),
+          alike.push_back(r.candidate);
+      const double worth = lost - 4 * static_cast<double>(effect ? effect->numbers.size() : 1),
                    counts =
                        contest.counts(lost, Ground(evidence_, m.residual, m.linear()).held_out_of);
       const auto simpler = [&](const Contender& r) {
-        return contest.says_it_simpler(r, present, lost);
+        return effect && contest.says_it_simpler(r, *effect, lost);
       };
       const auto better = std::find_if(rivals.begin(), rivals.end(), [&](const Contender& r) {
         return simpler(r) ||
@@ -381,14 +388,13 @@ class Search {
         continue;
       }
       const double allowed_loss = simpler(*better) ? contest.band_of(lost) : -options_.least_gain;
-      FittedMachine other = less;
-      add(other, *better, {});
-      if (other.held_out > m.held_out + allowed_loss) {
+      add(less, *better, {});
+      if (less.held_out > m.held_out + allowed_loss) {
         evidence_.anchor(m.machine);
         ++i;
         continue;
       }
-      m = std::move(other);  // the one that came in is the last, so that the next one is here
+      m = std::move(less);  // what came in is the last of its kind, so that the next one is here
     }
   }
 

@@ -118,32 +118,44 @@ TEST(ChatterSearch, WhatVibratedBeforeIsNoNews) {
   }));
 }
 
-TEST(ChatterSearch, NamesWhatMakesLapsDifferAsMuchAsTheyDo) {
-  const auto measured = [](double width_um, std::uint64_t seed) {
-    Record record = toy::commands(1000, 4);
-    const Machine truth = toy::machine({{"effects.X.load_play.width_um", width_um}});
-    const Prediction all = RattlingReplica(record).predict(truth);
-    toy::measure(record, {}, seed);
-    for (MeasuredSignal& s : record.signals) {
-      const std::size_t c = s.kind == SignalKind::position ? 0 : 1;
-      if (s.kind != SignalKind::position && s.kind != SignalKind::force) continue;
-      const Prediction still = toy::ToyReplica(record).predict(truth);
-      for (std::size_t k = 0; k < s.value.size(); ++k) s.value[k] += all[c][k] - still[c][k];
-    }
-    return record;
-  };
-  const Record healthy = measured(0, 6);
-  RattlingReplica of_healthy(healthy);
-  const auto diagnosed = [&](const Record& now) {
-    RattlingReplica replica(now);
-    return diagnose({now, replica, {}, drive_candidates()},
-                    less_healthy(now, healthy, of_healthy, {}));
-  };
-  const Diagnosis d = diagnosed(measured(8, 7));
+/// A record of a machine that trembles by play as this replica does, and shows nothing else of it.
+template <class Trembling>
+Record trembling(Record record, double width_um, std::uint64_t seed) {
+  toy::measure(record, {}, seed);
+  const Machine play = toy::machine({{"effects.X.load_play.width_um", width_um}});
+  const Prediction trembles = Trembling(record).predict(play),
+                   still = toy::ToyReplica(record).predict(play);
+  for (MeasuredSignal& s : record.signals) {
+    if (s.kind != SignalKind::position && s.kind != SignalKind::force) continue;
+    const std::size_t c = s.kind == SignalKind::position ? 0 : 1;
+    for (std::size_t k = 0; k < s.value.size(); ++k) s.value[k] += trembles[c][k] - still[c][k];
+  }
+  return record;
+}
+
+void expect_play(const Diagnosis& d, double width_um) {
   ASSERT_EQ(d.effects.size(), 1U);
   EXPECT_EQ(d.effects[0].name, "load_play");
-  EXPECT_LT(d.effects[0].numbers[0].low, 8);
-  EXPECT_GT(d.effects[0].numbers[0].high, 8);
+  EXPECT_LT(d.effects[0].numbers[0].low, width_um);
+  EXPECT_GT(d.effects[0].numbers[0].high, width_um);
+}
+
+template <class Trembling>
+Diagnosis diagnosed_against(const Record& now, const Record& healthy) {
+  Trembling replica(now), of_healthy(healthy);
+  return diagnose({now, replica, {}, drive_candidates()},
+                  less_healthy(now, healthy, of_healthy, {}));
+}
+
+TEST(ChatterSearch, NamesWhatMakesLapsDifferAsMuchAsTheyDo) {
+  const auto measured = [](double width_um, std::uint64_t seed) {
+    return trembling<RattlingReplica>(toy::commands(1000, 4), width_um, seed);
+  };
+  const auto diagnosed = [healthy = measured(0, 6)](const Record& now) {
+    return diagnosed_against<RattlingReplica>(now, healthy);
+  };
+  const Diagnosis d = diagnosed(measured(8, 7));
+  expect_play(d, 8);
   EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
   EXPECT_TRUE(diagnosed(measured(0, 8)).effects.empty());
   // No size that is tried rattles as much as this: the drive is told to be restless, no more.
@@ -194,32 +206,13 @@ class HuntingReplica : public toy::ToyReplica {
 
 TEST(ChatterSearch, NamesWhatMakesAnAxisTrembleAtRest) {
   const auto measured = [](double width_um, std::uint64_t seed) {
-    Record record = with_rests();
-    toy::measure(record, {}, seed);
-    const HuntingReplica replica(record);
-    const Prediction still = replica.predict({}),
-                     all = replica.predict(
-                         toy::machine({{"effects.X.load_play.width_um", width_um}}));
-    for (MeasuredSignal& s : record.signals) {
-      const std::size_t c = s.kind == SignalKind::position ? 0 : 1;
-      if (s.kind != SignalKind::position && s.kind != SignalKind::force) continue;
-      for (std::size_t k = 1000; k < s.value.size(); ++k)
-        if (k % 2000 > 1000) s.value[k] += all[c][k] - still[c][k];
-    }
-    return record;
+    return trembling<HuntingReplica>(with_rests(), width_um, seed);
   };
-  const Record healthy = measured(0, 10);
-  HuntingReplica of_healthy(healthy);
-  const auto diagnosed = [&](const Record& now) {
-    HuntingReplica replica(now);
-    return diagnose({now, replica, {}, drive_candidates()},
-                    less_healthy(now, healthy, of_healthy, {}));
+  const auto diagnosed = [healthy = measured(0, 10)](const Record& now) {
+    return diagnosed_against<HuntingReplica>(now, healthy);
   };
   const Diagnosis d = diagnosed(measured(8, 11));
-  ASSERT_EQ(d.effects.size(), 1U);
-  EXPECT_EQ(d.effects[0].name, "load_play");
-  EXPECT_LT(d.effects[0].numbers[0].low, 8);
-  EXPECT_GT(d.effects[0].numbers[0].high, 8);
+  expect_play(d, 8);
   ASSERT_FALSE(d.notes.empty());
   EXPECT_NE(d.notes[0].find("trembles at rest"), std::string::npos) << d.notes[0];
   const Diagnosis clean = diagnosed(measured(0, 12));

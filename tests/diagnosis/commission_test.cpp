@@ -11,6 +11,14 @@
 namespace vcnc {
 namespace {
 
+Commissioning commissioned_x(const Effects& effects) {
+  const RunOfMachine run = reversals_in_the_air(effects);
+  MachineReplica replica(run.record, run.declared, run.piece);
+  std::vector<Candidate> all = candidates(run.declared);
+  std::erase_if(all, [](const Candidate& c) { return c.place != "X"; });
+  return commission({run.record, replica, run.declared, all});
+}
+
 /// The whole machine, declared without friction and with a position gain that is too high.
 TEST(Commission, RecoversFrictionAndGainOfTheVirtualMachine) {
   if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
@@ -18,11 +26,7 @@ TEST(Commission, RecoversFrictionAndGainOfTheVirtualMachine) {
   effects.axis[kX].get<Coulomb>().level = 180;
   effects.axis[kX].get<Viscous>().coefficient = 1500;
   effects.axis[kX].get<KvError>().deviation = -0.06;
-  const RunOfMachine run = reversals_in_the_air(effects);
-  MachineReplica replica(run.record, run.declared, run.piece);
-  std::vector<Candidate> all = candidates(run.declared);
-  std::erase_if(all, [](const Candidate& c) { return c.place != "X"; });
-  const Commissioning c = commission({run.record, replica, run.declared, all});
+  const Commissioning c = commissioned_x(effects);
   EXPECT_NEAR(number_of(c.machine, "effects.X.coulomb.level_N"), 180, 0.02 * 180);
   EXPECT_NEAR(number_of(c.machine, "effects.X.viscous.coefficient_Ns_per_m"), 1500, 0.02 * 1500);
   EXPECT_NEAR(number_of(c.machine, "effects.X.kv_error.deviation_percent"), -6, 0.1);
@@ -31,6 +35,18 @@ TEST(Commission, RecoversFrictionAndGainOfTheVirtualMachine) {
     if (f.channel.kind == SignalKind::position && f.channel.axis == kX) {
       EXPECT_LT(f.after, 0.01 * f.before);
     }
+}
+
+/// Declared without friction, and without the filter of the measured velocity.
+TEST(Commission, RecoversALagOfTheVirtualMachine) {
+  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
+  Effects effects;
+  effects.axis[kX].get<Coulomb>().level = 180;
+  effects.deviations.push_back({"axes.X.velocity_lag_us", 250});
+  const Commissioning c = commissioned_x(effects);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.coulomb.level_N"), 180, 0.02 * 180);
+  EXPECT_NEAR(number_of(c.machine, "axes.X.velocity_lag_us"), 250, 10);
+  EXPECT_NEAR(number_of(c.machine, "axes.X.position_lag_us"), 0, 10);
 }
 
 }  // namespace
