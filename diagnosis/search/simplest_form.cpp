@@ -15,6 +15,7 @@ namespace {
 
 /// Of the noise of a sample: two machines that differ by less are the same.
 constexpr double kSameMachine = 1e-3;
+constexpr double kMoved = 0.1;  ///< of a usual size, to see whether a number moves anything
 /// A number that costs less chi-square to be as declared is put back: this much, or this part of
 /// what an effect must gain.
 constexpr double kUnneeded = 4, kUnneededPart = 0.25;
@@ -94,6 +95,26 @@ void put_back_undetermined(const Evidence& evidence, const Machine& declared,
   }
 }
 
+/// Numbers that move nothing where the machine stands, as the period of a wave that has gone, are
+/// as declared again.
+void put_back_idle(const Evidence& evidence, const Machine& declared, FittedMachine& m) {
+  for (std::size_t e = 0; e < m.added.size(); ++e)
+    for (std::size_t i = m.added[e].numbers.size(); i-- > 0;) {
+      const FreedNumber n = m.added[e].numbers[i];
+      const auto moves_nothing = [&](double value) {
+        Machine moved = m.machine;
+        move_number(moved, n.number.key, value);
+        return consequence(evidence, evidence.predict(moved), m.prediction).of_noise < kSameMachine;
+      };
+      const double put_back = number_of(declared, n.number.key), step = kMoved * n.number.typical;
+      if (!moves_nothing(put_back) ||
+          !moves_nothing(n.value + (n.value + step > n.number.max ? -step : step)))
+        continue;
+      forget(m, e, i);
+      move_number(m.machine, n.number.key, put_back);
+    }
+}
+
 /// Whether a number is an amplitude of the wave that its effect is.
 bool is_of_wave(const FreedNumber& n) {
   return !n.shape && !is_phase(n.number) && !has_no_phase(n.number);
@@ -133,6 +154,7 @@ void bring_to_simplest_form(const Evidence& evidence, const Machine& declared,
   put_back_unneeded(evidence, declared, std::max(kUnneeded, kUnneededPart * options.least_gain),
                     machine);
   put_back_undetermined(evidence, declared, options, floor, machine);
+  put_back_idle(evidence, declared, machine);
   prefer_positive(evidence, machine);
 }
 
