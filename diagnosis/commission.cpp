@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/intervals.hpp"
+#include "diagnosis/search/screening.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {
@@ -82,6 +82,16 @@ FittedMachine with_effects(const std::vector<Candidate>& candidates, const Fitte
   return more;
 }
 
+/// Held-out chi-square that is left with more numbers, as far as their sensitivities tell.
+double promised(const Evidence& evidence, const FittedMachine& machine, FittedMachine more) {
+  std::vector<FreedNumber> added = more.numbers();
+  added.erase(added.begin(), added.begin() + static_cast<std::ptrdiff_t>(machine.columns.size()));
+  take_values(added, machine.machine);
+  for (Column& c : columns_of(evidence, machine.machine, machine.prediction, added))
+    more.columns.push_back(std::move(c));
+  return Ground(evidence, machine.residual, more.linear()).held_out;
+}
+
 /// What was added goes along with every further fit, by its sensitivities.
 void rest(FittedMachine& m) {
   const std::vector<FreedNumber> numbers = m.numbers();
@@ -141,13 +151,14 @@ Commissioning commission(const DiagnosisCase& of, const DiagnosisOptions& option
         law = i;
     if (law < trials.size()) accept(std::move(trials[law]), axis, kFrictionLaws[law].name);
     for (std::vector<Step> gains = kGains; !gains.empty() && go(axis);) {
-      trials = fitted(gains, axis);
-      const auto best =
-          std::min_element(trials.begin(), trials.end(),
-                           [](const auto& x, const auto& y) { return x.held_out < y.held_out; });
-      if (machine.held_out - best->held_out <= options.least_gain) break;
-      const auto gain = gains.begin() + (best - trials.begin());
-      accept(std::move(*best), axis, gain->name);
+      std::vector<double> left(gains.size());
+      evidence.each_together(gains.size(), [&](std::size_t i) {
+        left[i] = promised(evidence, machine, with_effects(all, machine, axis, gains[i].effects));
+      });
+      const auto gain = gains.begin() + (std::min_element(left.begin(), left.end()) - left.begin());
+      FittedMachine best = std::move(fitted({*gain}, axis)[0]);
+      if (machine.held_out - best.held_out <= options.least_gain) break;
+      accept(std::move(best), axis, gain->name);
       gains.erase(gain);
     }
     found.insert(found.end(), machine.added.begin(), machine.added.end());

@@ -17,8 +17,9 @@ double observer_bandwidth(const ServoParams& servo) {
   return std::min(kObserverRatio * 2 * kPi * servo.velocity_bandwidth, kFastestObserver);
 }
 
-/// How far a first-order lag comes in one step.
-double share_of(double step, double lag) { return lag > 0 ? -std::expm1(-step / lag) : 1; }
+/// How far what lags behind a signal comes in one loop step: of a ramp it is late by the lag,
+/// however short that is.
+double share_of(double lag) { return kDriveLoopTime / (kDriveLoopTime + lag); }
 
 /// What follows a signal so; without a lag the signal itself, to the bit.
 template <class Real>
@@ -113,9 +114,9 @@ AxisDriveOf<Real>::AxisDriveOf(const AxisParams& declared, const AxisParams& act
   kp_ = kp;
   if (actual.servo.controller == ServoParams::Controller::sampled)
     sampled_.emplace(kp, inertia, actual.servo.dead_time, start);
-  lag_share_ = share_of(kPlantTime, servo.current_lag);
-  position_share_ = share_of(kDriveLoopTime, actual.servo.position_lag);
-  velocity_share_ = share_of(kDriveLoopTime, actual.servo.velocity_lag);
+  lag_share_ = servo.current_lag > 0 ? -std::expm1(-kPlantTime / servo.current_lag) : 1;
+  position_share_ = share_of(actual.servo.position_lag);
+  velocity_share_ = share_of(actual.servo.velocity_lag);
   TransmissionPort::Signal<double> transmission{.damping_ratio = 0.05};
   axis_chain<TransmissionPort>(effects, axis, seed).step(transmission, {});
   couple(transmission, actual.mechanics.load);
