@@ -109,81 +109,121 @@ bool is_driven(const Record& record, std::size_t axis) {
   return *high - *low > 1e-6;
 }
 
+class Commissioner {
+ public:
+  Commissioner(const DiagnosisCase& of, const DiagnosisOptions& options,
+               const KeepGoing& keep_going)
+      : of_(of),
+        options_(options),
+        keep_going_(keep_going),
+        candidates_(of.candidates),
+        evidence_(of.record, of.replica, of.declared),
+        machine_(fit_declared(evidence_, of.declared)) {
+    for (Candidate& lag : lags(of.declared)) candidates_.push_back(std::move(lag));
+  }
+
+  Commissioning run() {
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      if (!is_driven(of_.record, axis)) continue;
+      if (!go(axis)) break;
+      fit_friction(axis);
+      fit_gains(axis);
+      found_.insert(found_.end(), machine_.added.begin(), machine_.added.end());
+      rest(machine_);
+    }
+    fit_together();
+    tell();
+    return std::move(result_);
+  }
+
+ private:
+  bool go(std::size_t axis) const {
+    return !keep_going_ || keep_going_({fmt::format("friction and gains of {}", kAxisNames[axis]),
+                                        static_cast<double>(axis) / kAxisCount});
+  }
+
+  /// The machine with each of the steps, fitted.
+  std::vector<FittedMachine> fitted(const std::vector<Step>& steps, std::size_t axis) const {
+    std::vector<FittedMachine> trials(steps.size(), machine_);
+    evidence_.each_together(steps.size(), [&](std::size_t i) {
+      trials[i] = with_effects(candidates_, machine_, axis, steps[i].effects);
+      if (trials[i].added.size() > machine_.added.size()) converge(evidence_, trials[i]);
+    });
+    return trials;
+  }
+
+  void accept(FittedMachine better, std::size_t axis, const std::string& chosen) {
+    const double per_sample = 1 / std::max(1.0, evidence_.count(Role::held_out));
+    result_.notes.push_back(fmt::format("{}: {}, chi-square per held-out sample {:.3g} -> {:.3g}",
+                                        kAxisNames[axis], chosen, machine_.held_out * per_sample,
+                                        better.held_out * per_sample));
+    machine_ = std::move(better);
+  }
+
+  void fit_friction(std::size_t axis) {
+    std::vector<FittedMachine> trials = fitted(kFrictionLaws, axis);
+    const FittedMachine* best = &machine_;
+    for (const FittedMachine& trial : trials)
+      if (best->held_out - trial.held_out > options_.least_gain) best = &trial;
+    if (best == &machine_) return;
+    const auto law = static_cast<std::size_t>(best - trials.data());
+    accept(std::move(trials[law]), axis, kFrictionLaws[law].name);
+  }
+
+  void fit_gains(std::size_t axis) {
+    for (std::vector<Step> gains = kGains; !gains.empty() && go(axis);) {
+      std::vector<double> left(gains.size());
+      evidence_.each_together(gains.size(), [&](std::size_t i) {
+        left[i] = promised(evidence_, machine_,
+                           with_effects(candidates_, machine_, axis, gains[i].effects));
+      });
+      const auto gain = gains.begin() + (std::min_element(left.begin(), left.end()) - left.begin());
+      FittedMachine better = std::move(fitted({*gain}, axis)[0]);
+      if (machine_.held_out - better.held_out <= options_.least_gain) return;
+      accept(std::move(better), axis, gain->name);
+      gains.erase(gain);
+    }
+  }
+
+  /// Everything that was found, from where it has come to.
+  void fit_together() {
+    machine_.added = std::move(found_);
+    for (AddedEffect& a : machine_.added) take_values(a.numbers, machine_.machine);
+    machine_.nuisances = without(machine_.nuisances, machine_.numbers());
+    anchor_at(evidence_, machine_);
+    converge(evidence_, machine_);
+  }
+
+  void tell() {
+    const std::map<std::string, Interval> intervals = intervals_of(evidence_, machine_);
+    for (const std::vector<FreedNumber>& numbers : {machine_.numbers(), machine_.nuisances.numbers})
+      for (const FreedNumber& n : numbers) {
+        const auto i = intervals.find(n.number.key);
+        const double half = i == intervals.end() ? 0 : i->second.half_width;
+        result_.numbers.push_back({n.number.key, n.value, std::max(n.number.min, n.value - half),
+                                   std::min(n.number.max, n.value + half)});
+      }
+    result_.machine = machine_.machine;
+    result_.figures =
+        figures_of(of_.record, of_.replica, of_.declared, result_.machine, "all laps");
+    result_.warnings = evidence_.noise().warnings;
+  }
+
+  const DiagnosisCase& of_;
+  const DiagnosisOptions& options_;
+  const KeepGoing& keep_going_;
+  std::vector<Candidate> candidates_;
+  Evidence evidence_;
+  FittedMachine machine_;  ///< added: what was found on the axis in work
+  std::vector<AddedEffect> found_;
+  Commissioning result_;
+};
+
 }  // namespace
 
 Commissioning commission(const DiagnosisCase& of, const DiagnosisOptions& options,
                          const KeepGoing& keep_going) {
-  std::vector<Candidate> all = of.candidates;
-  for (Candidate& lag : lags(of.declared)) all.push_back(std::move(lag));
-  Evidence evidence(of.record, of.replica, of.declared);
-  FittedMachine machine = fit_declared(evidence, of.declared);
-  Commissioning result;
-  std::vector<AddedEffect> found;
-  bool going = true;
-  const auto go = [&](std::size_t axis) {
-    going = !keep_going || keep_going({fmt::format("friction and gains of {}", kAxisNames[axis]),
-                                       static_cast<double>(axis) / kAxisCount});
-    return going;
-  };
-  const auto fitted = [&](const std::vector<Step>& steps, std::size_t axis) {
-    std::vector<FittedMachine> trials(steps.size(), machine);
-    evidence.each_together(steps.size(), [&](std::size_t i) {
-      trials[i] = with_effects(all, machine, axis, steps[i].effects);
-      if (trials[i].added.size() > machine.added.size()) converge(evidence, trials[i]);
-    });
-    return trials;
-  };
-  const double per_sample = 1 / std::max(1.0, evidence.count(Role::held_out));
-  const auto accept = [&](FittedMachine best, std::size_t axis, const std::string& chosen) {
-    result.notes.push_back(fmt::format("{}: {}, chi-square per held-out sample {:.3g} -> {:.3g}",
-                                       kAxisNames[axis], chosen, machine.held_out * per_sample,
-                                       best.held_out * per_sample));
-    machine = std::move(best);
-  };
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    if (!is_driven(of.record, axis)) continue;
-    if (!go(axis)) break;
-    std::vector<FittedMachine> trials = fitted(kFrictionLaws, axis);
-    std::size_t law = trials.size();
-    for (std::size_t i = 0; i < trials.size(); ++i)
-      if ((law < trials.size() ? trials[law] : machine).held_out - trials[i].held_out >
-          options.least_gain)
-        law = i;
-    if (law < trials.size()) accept(std::move(trials[law]), axis, kFrictionLaws[law].name);
-    for (std::vector<Step> gains = kGains; !gains.empty() && go(axis);) {
-      std::vector<double> left(gains.size());
-      evidence.each_together(gains.size(), [&](std::size_t i) {
-        left[i] = promised(evidence, machine, with_effects(all, machine, axis, gains[i].effects));
-      });
-      const auto gain = gains.begin() + (std::min_element(left.begin(), left.end()) - left.begin());
-      FittedMachine best = std::move(fitted({*gain}, axis)[0]);
-      if (machine.held_out - best.held_out <= options.least_gain) break;
-      accept(std::move(best), axis, gain->name);
-      gains.erase(gain);
-    }
-    found.insert(found.end(), machine.added.begin(), machine.added.end());
-    rest(machine);
-    if (!going) break;
-  }
-  // All together, where they have come to.
-  machine.added = std::move(found);
-  machine.nuisances = without(machine.nuisances, machine.numbers());
-  for (AddedEffect& a : machine.added) take_values(a.numbers, machine.machine);
-  anchor_at(evidence, machine);
-  converge(evidence, machine);
-  const std::map<std::string, Interval> intervals = intervals_of(evidence, machine);
-  const auto tell = [&](const FreedNumber& n) {
-    const auto i = intervals.find(n.number.key);
-    const double half = i == intervals.end() ? 0 : i->second.half_width;
-    result.numbers.push_back({n.number.key, n.value, std::max(n.number.min, n.value - half),
-                              std::min(n.number.max, n.value + half)});
-  };
-  for (const FreedNumber& n : machine.numbers()) tell(n);
-  for (const FreedNumber& n : machine.nuisances.numbers) tell(n);
-  result.machine = machine.machine;
-  result.figures = figures_of(of.record, of.replica, of.declared, result.machine, "all laps");
-  result.warnings = evidence.noise().warnings;
-  return result;
+  return Commissioner(of, options, keep_going).run();
 }
 
 }  // namespace vcnc
