@@ -152,11 +152,19 @@ class Commissioner {
     return trials;
   }
 
+  double per_sample(const FittedMachine& m) const {
+    return m.held_out / std::max(1.0, evidence_.count(Role::held_out));
+  }
+
+  /// Whether it gains what noise would not, if noise were all that is left.
+  bool gains_enough(const FittedMachine& now, const FittedMachine& better) const {
+    return now.held_out - better.held_out > options_.least_gain * std::max(1.0, per_sample(now));
+  }
+
   void accept(FittedMachine better, std::size_t axis, const std::string& chosen) {
-    const double per_sample = 1 / std::max(1.0, evidence_.count(Role::held_out));
     result_.notes.push_back(fmt::format("{}: {}, chi-square per held-out sample {:.3g} -> {:.3g}",
-                                        kAxisNames[axis], chosen, machine_.held_out * per_sample,
-                                        better.held_out * per_sample));
+                                        kAxisNames[axis], chosen, per_sample(machine_),
+                                        per_sample(better)));
     machine_ = std::move(better);
   }
 
@@ -164,7 +172,7 @@ class Commissioner {
     std::vector<FittedMachine> trials = fitted(kFrictionLaws, axis);
     const FittedMachine* best = &machine_;
     for (const FittedMachine& trial : trials)
-      if (best->held_out - trial.held_out > options_.least_gain) best = &trial;
+      if (gains_enough(*best, trial)) best = &trial;
     if (best == &machine_) return;
     const auto law = static_cast<std::size_t>(best - trials.data());
     accept(std::move(trials[law]), axis, kFrictionLaws[law].name);
@@ -179,7 +187,7 @@ class Commissioner {
       });
       const auto gain = gains.begin() + (std::min_element(left.begin(), left.end()) - left.begin());
       FittedMachine better = std::move(fitted({*gain}, axis)[0]);
-      if (machine_.held_out - better.held_out <= options_.least_gain) return;
+      if (!gains_enough(machine_, better)) return;
       accept(std::move(better), axis, gain->name);
       gains.erase(gain);
     }

@@ -16,6 +16,7 @@ the measured shares must not fall behind those of bounds.toml; exit code 1 if on
 import argparse
 import concurrent.futures
 import json
+import math
 import os
 import pathlib
 import shutil
@@ -421,7 +422,7 @@ def markdown(parts, seeds):
             if "failed" in r:
                 lines.append(f"| {r['number']} | {r['kind']} | {', '.join(r['truth'])} | | error | |")
                 continue
-            strength = f"{r['strength']:.1f}" if "strength" in r else ""
+            strength = f"{r['strength']:.1f}" if math.isfinite(r.get("strength", math.nan)) else ""
             lines.append(f"| {r['number']} | {r['kind']} | {', '.join(r['truth'])} | {strength} | {r['verdict']} | "
                          f"{', '.join(r['told'])}{'; ' + r['law'] if r['law'] else ''} |")
         lines.append("")
