@@ -334,8 +334,9 @@ class Search {
     return m.added[i].gain = ground.held_out - m.held_out;
   }
 
-  /// Without one of its effects, everything else as it was.
+  /// What becomes of common numbers at whose drive nothing is any more.
   enum class Common { held, free };
+  /// Without one of its effects, everything else as it was.
   FittedMachine taken_out(const FittedMachine& m, std::size_t i, Common common) const {
     FittedMachine less = m;
     std::size_t first = 0;

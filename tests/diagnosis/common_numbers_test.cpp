@@ -51,6 +51,7 @@ TEST(CommonNumbers, AreWhatHasATolerance) {
   Machine m = machine(0.3, 0);
   m.axes[kX].servo.current_lag = 0;
   m.axes[kY].servo.current_lag = 200e-6;
+  m.effects.axis[kY].get<Presliding>().stiffness = 30e6;
   const std::vector<FreedNumber> all = common_numbers(m);
   const auto of = [&](const std::string& key) {
     for (const FreedNumber& n : all)
@@ -62,6 +63,8 @@ TEST(CommonNumbers, AreWhatHasATolerance) {
   EXPECT_EQ(of("axes.X.current_lag_us"), 0);  // there is none to be wrong about
   EXPECT_EQ(of("axes.X.position_lag_us"), 500);
   EXPECT_EQ(of("axes.X.velocity_lag_us"), 500);
+  EXPECT_DOUBLE_EQ(of("effects.Y.presliding.stiffness_N_per_um"), 15);
+  EXPECT_EQ(of("effects.X.presliding.stiffness_N_per_um"), 0);
   for (const FreedNumber& n : all) EXPECT_TRUE(n.common());
 }
 
