@@ -3,38 +3,50 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/intervals.hpp"
+#include "diagnosis/search/refit.hpp"
 #include "diagnosis/search/screening.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {
 namespace {
 
-/// Numbers that are fitted together: effects of an axis, or its lags.
-struct Step {
+constexpr double kFixed = 1e12;  ///< precision of a number that stays
+/// What an effect of the probe or the geometry must explain of what is left: less than that is the
+/// form of the contact.
+constexpr double kShareOfMeasuring = 0.05;
+
+/// Effects of an axis that are fitted together, or its lags.
+struct FrictionLaw {
   std::string name;
   std::vector<std::string> effects;
 };
 
 /// The simplest that does best is taken.
-const std::vector<Step> kFrictionLaws{
+const std::vector<FrictionLaw> kFrictionLaws{
     {"dry and viscous friction", {"coulomb", "viscous"}},
     {"dry, viscous and break-away friction", {"coulomb", "viscous", "stribeck"}},
     {"dry and viscous friction with pre-sliding", {"coulomb", "viscous", "presliding"}},
     {"dry, viscous and break-away friction with pre-sliding",
      {"coulomb", "viscous", "stribeck", "presliding"}}};
-/// One after the other, the best first.
-const std::vector<Step> kGains{{"kv_error", {"kv_error"}},
-                               {"velocity_ff_error", {"velocity_ff_error"}},
-                               {"acceleration_ff_error", {"acceleration_ff_error"}},
-                               {"velocity_gain_error", {"velocity_gain_error"}},
-                               {"integral_time_error", {"integral_time_error"}},
-                               {"lag of the position loop", {"position_lag_us"}},
-                               {"lag of the measured velocity", {"velocity_lag_us"}}};
+const std::vector<std::string> kGains{"kv_error",
+                                      "velocity_ff_error",
+                                      "acceleration_ff_error",
+                                      "velocity_gain_error",
+                                      "integral_time_error",
+                                      "position_lag_us",
+                                      "velocity_lag_us"};
+
+/// What a probe and the geometry of a healthy machine have, too.
+const std::vector<std::string> kMeasuring{"surface_friction", "probe_gain",     "cross_talk",
+                                          "stylus_bending",   "sample_latency", "squareness",
+                                          "a_axis_offset",    "a_axis_tilt",    "c_axis_offset",
+                                          "c_axis_tilt",      "deviation"};
 
 /// Of a cascade, no effect of the library: every one has them.
 std::vector<Candidate> lags(const Machine& declared) {
@@ -54,42 +66,55 @@ std::vector<Candidate> lags(const Machine& declared) {
   return all;
 }
 
-/// A machine with these effects of one axis in its fit, started at what is declared of them; those
-/// it has not yet.
-FittedMachine with_effects(const std::vector<Candidate>& candidates, const FittedMachine& machine,
-                           std::size_t axis, const std::vector<std::string>& effects) {
+/// A machine with these candidates in its fit, started at what is declared of them.
+FittedMachine with_candidates(const std::vector<Candidate>& candidates,
+                              const FittedMachine& machine,
+                              const std::vector<std::size_t>& chosen) {
   FittedMachine more = machine;
-  for (const std::string& effect : effects) {
-    for (std::size_t c = 0; c < candidates.size(); ++c) {
-      const Candidate& candidate = candidates[c];
-      if (candidate.effect != effect || candidate.place != kAxisNames[axis]) continue;
-      AddedEffect added{.candidate = c};
-      for (std::size_t i = 0; i < candidate.numbers.size(); ++i) {
-        const FreeNumber& n = candidate.numbers[i];
-        const bool shape =
-            std::find(candidate.shape.begin(), candidate.shape.end(), i) != candidate.shape.end();
-        const double declared = number_of(machine.machine, n.key);
-        // What cannot be negative would not leave zero.
-        const double start = n.one_sided ? 0.3 * std::abs(n.typical) : 0;
-        FreedNumber freed{.number = n, .value = declared != 0 ? declared : start, .shape = shape};
-        freed.number.typical = std::max(std::abs(n.typical), 1e-9);
-        added.numbers.push_back(freed);
-      }
-      more.added.push_back(std::move(added));
+  for (const std::size_t c : chosen) {
+    const Candidate& candidate = candidates[c];
+    AddedEffect added{.candidate = c};
+    for (std::size_t i = 0; i < candidate.numbers.size(); ++i) {
+      const FreeNumber& n = candidate.numbers[i];
+      const bool shape =
+          std::find(candidate.shape.begin(), candidate.shape.end(), i) != candidate.shape.end();
+      const double declared = number_of(machine.machine, n.key);
+      // What cannot be negative would not leave zero.
+      const double start = n.one_sided ? 0.3 * std::abs(n.typical) : 0;
+      FreedNumber freed{.number = n, .value = declared != 0 ? declared : start, .shape = shape};
+      freed.number.typical = std::max(std::abs(n.typical), 1e-9);
+      added.numbers.push_back(freed);
     }
+    more.added.push_back(std::move(added));
   }
   more.nuisances = without(more.nuisances, more.numbers());
   return more;
 }
 
-/// Held-out chi-square that is left with more numbers, as far as their sensitivities tell.
+/// Held-out chi-square that is left with more numbers, as far as their sensitivities tell; those
+/// that these take beyond their range stay where they are.
 double promised(const Evidence& evidence, const FittedMachine& machine, FittedMachine more) {
   std::vector<FreedNumber> added = more.numbers();
   added.erase(added.begin(), added.begin() + static_cast<std::ptrdiff_t>(machine.columns.size()));
   take_values(added, machine.machine);
   for (Column& c : columns_of(evidence, machine.machine, machine.prediction, added))
     more.columns.push_back(std::move(c));
-  return Ground(evidence, machine.residual, more.linear()).held_out;
+  const LinearPart linear = more.linear();
+  const Ground ground(evidence, machine.residual, linear);
+  Eigen::VectorXd precision = ground.precision, offset = ground.offset;
+  const auto first = static_cast<Eigen::Index>(linear.numbers.size() - added.size());
+  const auto step = [&] {
+    return linear_step(ground.grams.fitted, ground.grams.held_out, precision, offset);
+  };
+  const LinearStep free = step();
+  for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(added.size()); ++i) {
+    const FreedNumber& n = added[static_cast<std::size_t>(i)];
+    const double value = n.value + free.step[first + i] * n.number.typical;
+    if (n.number.min <= value && value <= n.number.max) continue;
+    precision[first + i] = kFixed;
+    offset[first + i] = 0;
+  }
+  return step().held_out;
 }
 
 /// What was added goes along with every further fit, by its sensitivities.
@@ -99,6 +124,12 @@ void rest(FittedMachine& m) {
   m.nuisances.columns.insert(m.nuisances.columns.end(), m.columns.begin(), m.columns.end());
   m.added.clear();
   m.columns.clear();
+}
+
+std::string told(const Candidate& c) {
+  if (c.effect == "position_lag_us") return "lag of the position loop";
+  if (c.effect == "velocity_lag_us") return "lag of the measured velocity";
+  return c.effect == "deviation" ? c.place : c.effect;
 }
 
 /// Whether an axis is told to move at all.
@@ -124,93 +155,107 @@ class Commissioner {
 
   Commissioning run() {
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      const std::string place(kAxisNames[axis]);
       if (!is_driven(of_.record, axis)) continue;
-      if (!go(axis)) break;
-      fit_friction(axis);
-      fit_gains(axis);
-      found_.insert(found_.end(), machine_.added.begin(), machine_.added.end());
+      if (!go("friction and gains of " + place, axis)) break;
+      fit_friction(place);
+      fit_best_of(the(kGains, place), place, 0, [&] { return go("gains of " + place, axis); });
       rest(machine_);
     }
+    fit_together();
+    std::vector<std::size_t> measuring;
+    for (const std::string place : {"probe", "geometry", "probe.damping_ratio"})
+      for (const std::size_t c : the(kMeasuring, place)) measuring.push_back(c);
+    fit_best_of(measuring, "probe", kShareOfMeasuring,
+                [&] { return go("probe and geometry", kAxisCount); });
+    rest(machine_);
     fit_together();
     tell();
     return std::move(result_);
   }
 
  private:
-  bool go(std::size_t axis) const {
-    return !keep_going_ || keep_going_({fmt::format("friction and gains of {}", kAxisNames[axis]),
-                                        static_cast<double>(axis) / kAxisCount});
+  bool go(const std::string& doing, std::size_t done) const {
+    return !keep_going_ || keep_going_({doing, static_cast<double>(done) / (kAxisCount + 1)});
   }
 
-  /// The machine with each of the steps, fitted.
-  std::vector<FittedMachine> fitted(const std::vector<Step>& steps, std::size_t axis) const {
-    std::vector<FittedMachine> trials(steps.size(), machine_);
-    evidence_.each_together(steps.size(), [&](std::size_t i) {
-      trials[i] = with_effects(candidates_, machine_, axis, steps[i].effects);
-      if (trials[i].added.size() > machine_.added.size()) converge(evidence_, trials[i]);
-    });
-    return trials;
+  /// Candidates by the names of their effects, in this order.
+  std::vector<std::size_t> the(const std::vector<std::string>& effects,
+                               const std::string& place) const {
+    std::vector<std::size_t> all;
+    for (const std::string& effect : effects)
+      for (std::size_t c = 0; c < candidates_.size(); ++c)
+        if (candidates_[c].effect == effect && candidates_[c].place == place) all.push_back(c);
+    return all;
   }
 
   double per_sample(const FittedMachine& m) const {
     return m.held_out / std::max(1.0, evidence_.count(Role::held_out));
   }
 
-  /// Whether it gains what noise would not, if noise were all that is left.
-  bool gains_enough(const FittedMachine& now, const FittedMachine& better) const {
-    return now.held_out - better.held_out > options_.least_gain * std::max(1.0, per_sample(now));
+  /// Whether it gains what noise would not, if noise were all that is left, and that share of what
+  /// is more than noise.
+  bool gains_enough(const FittedMachine& now, const FittedMachine& better,
+                    double least_share = 0) const {
+    const double above = now.held_out - evidence_.count(Role::held_out);
+    return now.held_out - better.held_out >
+           std::max(options_.least_gain * std::max(1.0, per_sample(now)), least_share * above);
   }
 
-  void accept(FittedMachine better, std::size_t axis, const std::string& chosen) {
+  void accept(FittedMachine better, const std::string& place, const std::string& chosen) {
     result_.notes.push_back(fmt::format("{}: {}, chi-square per held-out sample {:.3g} -> {:.3g}",
-                                        kAxisNames[axis], chosen, per_sample(machine_),
-                                        per_sample(better)));
+                                        place, chosen, per_sample(machine_), per_sample(better)));
     machine_ = std::move(better);
   }
 
-  void fit_friction(std::size_t axis) {
-    std::vector<FittedMachine> trials = fitted(kFrictionLaws, axis);
+  void fit_friction(const std::string& place) {
+    std::vector<FittedMachine> trials(kFrictionLaws.size(), machine_);
+    evidence_.each_together(trials.size(), [&](std::size_t i) {
+      const std::vector<std::size_t> law = the(kFrictionLaws[i].effects, place);
+      if (law.empty()) return;
+      trials[i] = with_candidates(candidates_, machine_, law);
+      converge(evidence_, trials[i]);
+    });
     const FittedMachine* best = &machine_;
     for (const FittedMachine& trial : trials)
       if (gains_enough(*best, trial)) best = &trial;
     if (best == &machine_) return;
     const auto law = static_cast<std::size_t>(best - trials.data());
-    accept(std::move(trials[law]), axis, kFrictionLaws[law].name);
+    accept(std::move(trials[law]), place, kFrictionLaws[law].name);
   }
 
-  void fit_gains(std::size_t axis) {
-    for (std::vector<Step> gains = kGains; !gains.empty() && go(axis);) {
-      std::vector<double> left(gains.size());
-      evidence_.each_together(gains.size(), [&](std::size_t i) {
-        left[i] = promised(evidence_, machine_,
-                           with_effects(candidates_, machine_, axis, gains[i].effects));
+  /// One after the other, the one first that promises most.
+  void fit_best_of(std::vector<std::size_t> left, const std::string& place, double least_share,
+                   const std::function<bool()>& go_on) {
+    while (!left.empty() && go_on()) {
+      std::vector<double> promise(left.size());
+      evidence_.each_together(left.size(), [&](std::size_t i) {
+        promise[i] =
+            promised(evidence_, machine_, with_candidates(candidates_, machine_, {left[i]}));
       });
-      const auto gain = gains.begin() + (std::min_element(left.begin(), left.end()) - left.begin());
-      FittedMachine better = std::move(fitted({*gain}, axis)[0]);
-      if (!gains_enough(machine_, better)) return;
-      accept(std::move(better), axis, gain->name);
-      gains.erase(gain);
+      const auto best =
+          left.begin() + (std::min_element(promise.begin(), promise.end()) - promise.begin());
+      FittedMachine better = with_candidates(candidates_, machine_, {*best});
+      converge(evidence_, better);
+      if (!gains_enough(machine_, better, least_share)) return;
+      accept(std::move(better), place, told(candidates_[*best]));
+      left.erase(best);
     }
   }
 
-  /// Everything that was found, from where it has come to.
+  /// Everything together, with sensitivities from where it has come to.
   void fit_together() {
-    machine_.added = std::move(found_);
-    for (AddedEffect& a : machine_.added) take_values(a.numbers, machine_.machine);
-    machine_.nuisances = without(machine_.nuisances, machine_.numbers());
-    anchor_at(evidence_, machine_);
-    converge(evidence_, machine_);
+    machine_ = fit_numbers(evidence_, machine_.machine, machine_.nuisances.numbers);
   }
 
   void tell() {
     const std::map<std::string, Interval> intervals = intervals_of(evidence_, machine_);
-    for (const std::vector<FreedNumber>& numbers : {machine_.numbers(), machine_.nuisances.numbers})
-      for (const FreedNumber& n : numbers) {
-        const auto i = intervals.find(n.number.key);
-        const double half = i == intervals.end() ? 0 : i->second.half_width;
-        result_.numbers.push_back({n.number.key, n.value, std::max(n.number.min, n.value - half),
-                                   std::min(n.number.max, n.value + half)});
-      }
+    for (const FreedNumber& n : machine_.nuisances.numbers) {
+      const auto i = intervals.find(n.number.key);
+      const double half = i == intervals.end() ? 0 : i->second.half_width;
+      result_.numbers.push_back({n.number.key, n.value, std::max(n.number.min, n.value - half),
+                                 std::min(n.number.max, n.value + half)});
+    }
     result_.machine = machine_.machine;
     result_.figures =
         figures_of(of_.record, of_.replica, of_.declared, result_.machine, "all laps");
@@ -223,7 +268,6 @@ class Commissioner {
   std::vector<Candidate> candidates_;
   Evidence evidence_;
   FittedMachine machine_;  ///< added: what was found on the axis in work
-  std::vector<AddedEffect> found_;
   Commissioning result_;
 };
 

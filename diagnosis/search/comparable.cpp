@@ -21,6 +21,10 @@ constexpr double kSlowSliding = 20e-3;  // [m/s]
 /// A ball that is deflected by less is free; readings so soon before and after it touches depend
 /// on where exactly the piece lies.
 constexpr double kFree = 1e-6, kTouching = 0.05;  // [m], [s]
+/// A ball on a piece rests below this speed; its drag has turned over after twice the friction
+/// times the deflection, for a friction of 0.2.
+constexpr double kResting = 2e-3, kTurnOver = 0.4;  // [m/s]
+constexpr double kLever = 0.1;                      // of a rotary axis [m]
 
 void mask_standing(const Record& record, const std::vector<ComparedChannel>& channels,
                    Flags& valid) {
@@ -91,6 +95,42 @@ void mask_touching(const Record& record, const std::vector<ComparedChannel>& cha
   }
 }
 
+/// Way of the ball over the piece in each cycle, by the commands [m]; empty where one is missing.
+std::vector<double> ways(const Record& record) {
+  std::vector<double> squares(record.samples(), 0.0);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const MeasuredSignal* command = record.find(SignalKind::command, axis);
+    if (!command) {
+      if (!is_rotary(axis)) return {};
+      continue;
+    }
+    const double lever = is_rotary(axis) ? kLever : 1;
+    for (std::size_t k = 1; k < squares.size(); ++k) {
+      const double way = lever * (command->value[k] - command->value[k - 1]);
+      squares[k] += way * way;
+    }
+  }
+  if (squares.size() > 1) squares[0] = squares[1];
+  for (double& s : squares) s = std::sqrt(s);
+  return squares;
+}
+
+void mask_resting_ball(const Record& record, const std::vector<ComparedChannel>& channels,
+                       const Prediction& declared, Flags& valid) {
+  const std::vector<double> way = ways(record);
+  double since = 0;
+  for (std::size_t k = 0; k < way.size(); ++k) {
+    since = way[k] < kResting * record.period ? 0 : since + way[k];
+    double square = 0;
+    for (std::size_t c = 0; c < valid.size(); ++c)
+      if (channels[c].kind == SignalKind::deflection && std::isfinite(declared[c][k]))
+        square += declared[c][k] * declared[c][k];
+    if (square < kFree * kFree || since > kTurnOver * std::sqrt(square)) continue;
+    for (std::size_t c = 0; c < valid.size(); ++c)
+      if (channels[c].kind == SignalKind::deflection) valid[c][k] = 0;
+  }
+}
+
 void mask_turning_drag(const Record& record, const std::vector<ComparedChannel>& channels,
                        const SeriesOfChannels& measured, const Prediction& declared, Flags& valid) {
   const auto reach = static_cast<std::size_t>(std::round(kReach / record.period));
@@ -144,6 +184,7 @@ std::vector<std::vector<char>> comparable_samples(const Record& record,
   mask_standing(record, channels, valid);
   mask_settled(record, channels, valid);
   mask_touching(record, channels, declared, valid);
+  mask_resting_ball(record, channels, declared, valid);
   mask_turning_drag(record, channels, measured, declared, valid);
   return valid;
 }

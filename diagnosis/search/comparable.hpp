@@ -3,8 +3,8 @@
 // Not those that are missing in either, not force and twist of an axis that stands (stuck friction
 // and the loop's integral are not predictable there) nor its position once it has settled, not
 // readings of the probe about the moment of touching, which depends on where exactly the piece
-// lies, and not such as are rough while the ball slides slowly: the drag on it turns over, nobody
-// can tell when.
+// lies, not those of a ball that rests on the piece until its drag has turned over again, and not
+// such as are rough while the ball slides slowly: the drag turns over, nobody can tell when.
 #pragma once
 
 #include <vector>

@@ -22,6 +22,7 @@ constexpr double kChance = 3;      ///< standard deviations of a sum of squares
 constexpr double kNothing = 0.03;  ///< of a typical size
 constexpr double kPromise = 0.3;   ///< of what is needed: worth a refit
 constexpr double kLeaves = 0.05;   ///< part of what is left that a winner may leave
+constexpr double kNearly = 0.99;   ///< part of a gain that may be as much when all is refitted
 constexpr std::size_t kElsewhere = 2;
 constexpr std::size_t kFinalists = 3, kRivals = 4, kMoreRefits = 8;
 
@@ -119,8 +120,11 @@ std::vector<Contender> Contest::rivals(double least, std::size_t but) const {
   std::vector<Screened> list =
       best_of_each(screen(rules_.evidence, ground_, doubt_, rules_.candidates, rules_.trials));
   std::erase_if(list, [&](const Screened& s) { return s.gain < least || candidate_of(s) == but; });
-  if (list.size() > kRivals) list.resize(kRivals);
+  std::size_t few = std::min(list.size(), kRivals);
+  while (few < std::min(list.size(), kMoreRefits) && list[few].gain > kNearly * list[0].gain) ++few;
+  list.resize(few);
   std::vector<Contender> all = refitted(list);
+  finish(all);
   for (Contender& c : releases(Released::anywhere))
     if (c.gain >= least) all.push_back(std::move(c));
   sort_by_worth(all);
@@ -207,7 +211,8 @@ std::vector<Screened> Contest::likes_of(const std::vector<Contender>& all,
   const double best = all.front().gain;
   if (best < rules_.threshold(ground_.held_out)) return more;
   for (const Screened& s : screened) {
-    if (more.size() == kMoreRefits || s.gain < best - 2 * band_of(best)) break;
+    if (more.size() == kMoreRefits || s.gain < std::min(best - 2 * band_of(best), kNearly * best))
+      break;
     if (std::none_of(list.begin(), list.end(),
                      [&](const Screened& l) { return l.trial == s.trial; }))
       more.push_back(s);
@@ -291,7 +296,8 @@ void Contest::finish(std::vector<Contender>& all) const {
   const double best = all.empty() ? 0 : all.front().gain;
   std::size_t finalists = 0;
   while (finalists < all.size() && all[finalists].gain >= 0.5 * best &&
-         (finalists < kFinalists || all[finalists].gain >= best - rules_.options.class_gain))
+         (finalists < kFinalists || all[finalists].gain >= best - rules_.options.class_gain ||
+          (finalists < kMoreRefits && all[finalists].gain >= kNearly * best)))
     ++finalists;
   rules_.evidence.each_together(finalists, [&](std::size_t i) {
     Contender& c = all[i];

@@ -69,11 +69,13 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
   const std::vector<Stretch>& laps = partition_.stretches;
   const std::vector<SeriesOfChannels> per_shift =
       readings_per_shift(with_piece_shifted(declared, kShift));
-  // A piece or an axis that drifts from lap to lap is no noise of the samples.
+  // A piece, an axis or a clock that drifts from lap to lap is no noise of the samples.
   if (partition_.repeated && !per_shift.empty()) {
-    std::vector<SeriesOfChannels> either = readings_per_shift(with_axes_shifted(declared, kShift));
-    either.insert(either.end(), per_shift.begin(), per_shift.end());
-    take_out_shifts(laps, either, difference);
+    std::vector<Machine> shifted = with_axes_shifted(declared, kShift);
+    shifted.push_back(with_older_readings(declared));
+    std::vector<SeriesOfChannels> all = readings_per_shift(shifted);
+    all.insert(all.end(), per_shift.begin(), per_shift.end());
+    take_out_shifts(laps, all, difference);
   }
   events_ = lap_events(partition_, record.period, replica.channels(), difference);
   leave_out(events_);

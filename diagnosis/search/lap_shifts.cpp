@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "diagnosis/search/freed_number.hpp"
+#include "model/probe/probe_sensor.hpp"
 
 namespace vcnc {
 namespace {
@@ -71,6 +72,12 @@ std::vector<Machine> with_axes_shifted(const Machine& machine, double by) {
     all.back().effects.laws.push_back(std::move(shift));
   }
   return all;
+}
+
+Machine with_older_readings(const Machine& machine) {
+  Machine older = machine;
+  older.effects.get<SampleLatency>().latency += kProbeSampleTime;
+  return older;
 }
 
 Eigen::Vector3d rms_shift(const std::vector<Stretch>& laps,

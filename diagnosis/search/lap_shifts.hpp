@@ -25,6 +25,8 @@ namespace vcnc {
 /// The piece shifted in x, y, z; the tool centre shifted along X, Y, Z, each [m].
 std::vector<Machine> with_piece_shifted(const Machine& machine, double by);
 std::vector<Machine> with_axes_shifted(const Machine& machine, double by);
+/// With readings 0.1 ms older: what those of a module differ by whose clock is not the machine's.
+Machine with_older_readings(const Machine& machine);
 
 /// RMS over the laps of the shifts in x, y, z that explain `series` best beside such that grow
 /// during a lap, in the unit that the three `per_shift` are per; laps count by how well they tell.

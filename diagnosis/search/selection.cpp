@@ -358,7 +358,7 @@ class Search {
   /// place, with those common numbers that it had.
   void exchange(FittedMachine& m) {
     std::size_t tries = 2 * m.found();
-    for (std::size_t i = 0; i < m.found() && m.found() > 1 && tries-- > 0 && going_;) {
+    for (std::size_t i = 0; i < m.found() && tries-- > 0 && going_;) {
       AddedEffect* effect = i < m.added.size() ? &m.added[i] : nullptr;
       ReleasedNumber* number = effect ? nullptr : &m.released[i - m.added.size()];
       FittedMachine less =

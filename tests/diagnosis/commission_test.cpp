@@ -49,5 +49,23 @@ TEST(Commission, RecoversALagOfTheVirtualMachine) {
   EXPECT_NEAR(number_of(c.machine, "axes.X.position_lag_us"), 0, 10);
 }
 
+/// Declared with another damping of the probe, without friction of the ball and without squareness.
+TEST(Commission, RecoversTheProbeAndTheGeometryOfTheVirtualMachine) {
+  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
+  Effects effects;
+  effects.get<SurfaceFriction>().coefficient = 0.12;
+  effects.get<Squareness>().xy = 40e-6;
+  effects.deviations.push_back({"probe.damping_ratio", 0.5});
+  const RunOfMachine run = circles_in_a_ring(effects);
+  MachineReplica replica(run.record, run.declared, run.piece);
+  std::vector<Candidate> all = candidates(run.declared);
+  std::erase_if(all, [](const Candidate& c) { return c.place.size() == 1; });
+  const Commissioning c = commission({run.record, replica, run.declared, all});
+  EXPECT_NEAR(number_of(c.machine, "effects.probe.surface_friction.coefficient"), 0.12, 0.002);
+  EXPECT_NEAR(number_of(c.machine, "effects.geometry.squareness.xy_urad"), 40, 1);
+  EXPECT_NEAR(number_of(c.machine, "probe.damping_ratio"), 0.5, 0.02);
+  EXPECT_EQ(number_of(c.machine, "effects.probe.sample_latency.latency_us"), 0);
+}
+
 }  // namespace
 }  // namespace vcnc

@@ -70,6 +70,18 @@ TEST(Comparable, NotTheForceOfAnAxisThatStands) {
   EXPECT_FALSE(flags[1][1010] || flags[1][1999]);
 }
 
+TEST(Comparable, NotReadingsOfABallThatRestsUntilItsDragHasTurnedOver) {
+  std::vector<double> x = ramp(0.05);
+  for (std::size_t k = kSamples; k-- > 1000;) x[k] = k < 1500 ? x[1000] : x[k - 500];
+  RecordedRamp run(x);
+  run.predicted[2].assign(x.size(), 0.5e-3);  // 0.2 mm to turn over: four samples
+  const auto flags = run.comparable();
+  EXPECT_TRUE(flags[2][1000]);
+  EXPECT_FALSE(flags[2][1001] || flags[2][1500] || flags[2][1503]);
+  EXPECT_TRUE(flags[2][1506]);
+  EXPECT_TRUE(flags[0][1001]);
+}
+
 TEST(Comparable, NotReadingsAboutTheMomentOfTouching) {
   RecordedRamp run(ramp(0.05));
   for (std::size_t k = 0; k < 800; ++k) run.measured[2][k] = run.predicted[2][k] = 0;

@@ -117,7 +117,7 @@ def stem(key):
 
 def within(true, low, high):
     """None: without a limit."""
-    return (low is None or low <= true) and (high is None or true <= high)
+    return bool((low is None or low <= true) and (high is None or true <= high))
 
 
 def numbers_of(found):

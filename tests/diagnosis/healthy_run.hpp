@@ -15,5 +15,7 @@ struct RunOfMachine {
 
 /// X there and back in the air, on a machine with `effects` that declares none of them.
 RunOfMachine reversals_in_the_air(const Effects& effects);
+/// Circles of the ball in a ring at several feeds, on a machine likewise.
+RunOfMachine circles_in_a_ring(const Effects& effects);
 
 }  // namespace vcnc

@@ -12,10 +12,22 @@ RunOfMachine reversals_in_the_air(const Effects& effects) {
   return {std::move(run.record), std::move(run.declared), std::move(run.piece)};
 }
 
+RunOfMachine circles_in_a_ring(const Effects& effects) {
+  RecordedRun run = recorded_run(Showing::circle_feeds, kX, effects);
+  return {std::move(run.record), std::move(run.declared), std::move(run.piece)};
+}
+
 TEST(ReversalsInTheAir, AreARecordOfXThatMoves) {
   const RunOfMachine run = reversals_in_the_air({});
   const std::vector<double>& x = run.record.find(SignalKind::command, kX)->value;
   EXPECT_GT(*std::max_element(x.begin(), x.end()) - *std::min_element(x.begin(), x.end()), 1e-3);
+}
+
+TEST(CirclesInARing, AreARecordOfABallThatIsDeflected) {
+  const RunOfMachine run = circles_in_a_ring({});
+  ASSERT_TRUE(run.piece);
+  const std::vector<double>& x = run.record.find(SignalKind::deflection, 0)->value;
+  EXPECT_GT(*std::max_element(x.begin(), x.end()), 0.1e-3);
 }
 
 }  // namespace vcnc

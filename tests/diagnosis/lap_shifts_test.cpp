@@ -102,6 +102,34 @@ class RoundingReplica : public toy::ToyReplica {
   }
 };
 
+/// The toy machine with readings that are late.
+class LateReplica : public toy::ToyReplica {
+ public:
+  using toy::ToyReplica::ToyReplica;
+  Prediction predict(const Machine& m) const override {
+    Prediction all = toy::ToyReplica::predict(m);
+    const std::vector<double>& on_time = all[2];
+    std::vector<double> late = on_time;
+    for (std::size_t k = 1; k < late.size(); ++k)
+      late[k] -= m.effects.get<SampleLatency>().latency * (on_time[k] - on_time[k - 1]) / 1e-3;
+    all[2] = late;
+    return all;
+  }
+};
+
+TEST(Evidence, AClockThatDriftsIsNoNoise) {
+  const Machine declared = toy::machine({{"effects.geometry.squareness.xy_urad", 2000}});
+  Record record = toy::commands(1000, 4);
+  const Prediction on_time = toy::ToyReplica(record).predict(declared);
+  toy::measure(record, declared, 21);
+  std::vector<double>& reading = record.signals.back().value;
+  for (std::size_t k = 1; k < reading.size(); ++k)  // 5 ms later at the end, of 0.4 um per ms
+    reading[k] -= 5 * static_cast<double>(k) / 12000 * (on_time[2][k] - on_time[2][k - 1]);
+  LateReplica replica(record);
+  const Evidence e(record, replica, declared);
+  EXPECT_NEAR(e.noise().channels[2].rms, toy::kProbeNoise, 0.1 * toy::kProbeNoise);
+}
+
 TEST(Evidence, ShiftsThatRoundingMakesAreNoise) {
   Record shifted = toy::commands(1000, 4);
   toy::measure(shifted, Machine(), 13);

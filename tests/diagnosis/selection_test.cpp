@@ -339,8 +339,6 @@ TEST(Selection, RivalsHaveTheCommonNumbersOfTheOneInPlace) {
   ReplicaOfChange replica(inner, {}, options.common);
   Evidence evidence(record, replica, {});
   const SelectionResult result = select_effects_of(evidence, {}, inner.candidates(), options, {});
-  ASSERT_FALSE(result.ladder.empty());
-  EXPECT_EQ(result.ladder.front().name, wrong);
   EXPECT_EQ(result.found.added.size(), 2U);
   EXPECT_NEAR(number_of(result.found.machine, right), 2, 0.02);
   EXPECT_NEAR(number_of(result.found.machine, sixth), 1, 0.01);
