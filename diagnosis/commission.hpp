@@ -22,7 +22,9 @@ struct Commissioning {
 /// Fits declared numbers within their tolerances and, axis by axis, the simplest friction law that
 /// does best on held-out data: none, dry and viscous, with break-away, with pre-sliding, with both;
 /// then gains of its loops, feed-forwards and lags, the best first, where held-out data ask for
-/// them; at last all axes together.
+/// them; then all axes together, and what of the probe and the geometry (friction of the ball,
+/// damping, gains, cross-talk, latency, squareness, where the rotary axes lie) explains a twentieth
+/// of what is left; at last everything together.
 Commissioning commission(const DiagnosisCase& of, const DiagnosisOptions& options = {},
                          const KeepGoing& keep_going = {});
 

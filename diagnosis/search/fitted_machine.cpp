@@ -142,7 +142,10 @@ void linearise(const Evidence& evidence, FittedMachine& m, const std::vector<std
     m.nuisances.columns[which[i]] = std::move(columns[i]);
 }
 
-constexpr double kSettled = 5;  // chi-square that no further look is worth
+/// Chi-square that no further look is worth: little, and little of what is more than noise.
+double settled(const Evidence& evidence, const FittedMachine& m) {
+  return 5 + 1e-4 * std::max(0.0, m.held_out - evidence.count(Role::held_out));
+}
 
 /// Fits where the replica is exact: what is found there may be where it is not any more.
 void converge_exactly(Evidence& evidence, FittedMachine& m) {
@@ -151,7 +154,7 @@ void converge_exactly(Evidence& evidence, FittedMachine& m) {
     converge(evidence, m);
     const double there = misfit(evidence, m);
     anchor_at(evidence, m);
-    if (std::abs(there - misfit(evidence, m)) < kSettled) break;
+    if (std::abs(there - misfit(evidence, m)) < settled(evidence, m)) break;
   }
 }
 
@@ -166,7 +169,7 @@ void fit_in_rounds(Evidence& evidence, FittedMachine& m, const std::vector<std::
     converge_exactly(evidence, m);
     gain = before - m.held_out;
     const double next = last > 0 && std::isfinite(last) ? gain * gain / last : gain;
-    if (gain < kSettled || next < kSettled) break;
+    if (std::min(gain, next) < settled(evidence, m)) break;
   }
 }
 

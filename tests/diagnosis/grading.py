@@ -124,6 +124,14 @@ def numbers_of(found):
     return {n["key"]: n for n in found.get("parameters", [])}
 
 
+def half_a_turn_on(values, numbers):
+    """Whether the wave that was told is the true one half a turn on, with the other sign."""
+    for key, number in numbers.items():
+        if "phase_deg" in key and key in values:
+            return math.cos(math.radians(number["value"] - values[key])) < 0
+    return False
+
+
 def grade(answer, report, seconds):
     """One row."""
     told = claims(report)
@@ -157,6 +165,8 @@ def grade(answer, report, seconds):
                     # A wave half a turn on is the same wave.
                     if "amplitude" in key and key[-2:] not in (".x", ".y", ".z") and any("phase" in k for k in numbers_of(f)):
                         true = math.copysign(true, number["value"])
+                    if "_wave_" in key and half_a_turn_on(answer["values"], numbers_of(f)):
+                        true = -true
                     # A component that is nearly nothing is held against the largest of its vector.
                     scale = max(abs(v) for k, v in answer["values"].items() if stem(k) == stem(key))
                     if scale > 0:

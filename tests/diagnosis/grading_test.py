@@ -51,6 +51,18 @@ class Grading(unittest.TestCase):
         self.assertAlmostEqual(row["errors"][0], 0.01)
         self.assertEqual(row["covered"], [True])
 
+    def test_both_waves_of_a_straightness_turn_over_together(self):
+        key = "effects.Z.straightness."
+        values = {key + "first_wave_um": 2.0, key + "second_wave_um": -1.0, key + "phase_deg": 30.0}
+        truth = {"kind": "single", "effects": [{"name": "straightness", "place": "Z", "parameters": values}], "values": values}
+        told = found("straightness", "Z", key + "first_wave_um", -2.0, -2.1, -1.9)
+        told["parameters"] += [{"key": key + "second_wave_um", "value": 1.0, "low": 0.9, "high": 1.1},
+                               {"key": key + "phase_deg", "value": -150.0, "low": -152, "high": -148}]
+        row = grading.grade(truth, report(told), 1)
+        self.assertEqual((row["errors"], row["covered"]), ([0, 0], [True, True]))
+        told["parameters"][2]["value"] = 30.0
+        self.assertEqual(grading.grade(truth, report(told), 1)["covered"], [False, False])
+
     def test_a_true_value_of_nought_has_no_relative_error(self):
         truth = dict(TRUTH, values={"effects.X.backlash.gap_um": 0.0})
         row = grading.grade(truth, report(found("backlash", "X", "effects.X.backlash.gap_um", 4.1, 3.9, None)), 1)
