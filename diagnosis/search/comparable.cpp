@@ -21,10 +21,10 @@ constexpr double kSlowSliding = 20e-3;  // [m/s]
 /// A ball that is deflected by less is free; readings so soon before and after it touches depend
 /// on where exactly the piece lies.
 constexpr double kFree = 1e-6, kTouching = 0.05;  // [m], [s]
-/// A ball on a piece rests below this speed; its drag has turned over after twice the friction
-/// times the deflection, for a friction of 0.2.
-constexpr double kResting = 2e-3, kTurnOver = 0.4;  // [m/s]
-constexpr double kLever = 0.1;                      // of a rotary axis [m]
+/// A ball on a piece rests below this part of its usual speed; its drag has turned over after
+/// twice the friction times the deflection, for a friction of 0.2.
+constexpr double kResting = 0.04, kTurnOver = 0.4;
+constexpr double kLever = 0.1;  // of a rotary axis [m]
 
 void mask_standing(const Record& record, const std::vector<ComparedChannel>& channels,
                    Flags& valid) {
@@ -118,14 +118,20 @@ std::vector<double> ways(const Record& record) {
 void mask_resting_ball(const Record& record, const std::vector<ComparedChannel>& channels,
                        const Prediction& declared, Flags& valid) {
   const std::vector<double> way = ways(record);
-  double since = 0;
+  std::vector<double> deflection(way.size(), 0.0), usual;
   for (std::size_t k = 0; k < way.size(); ++k) {
-    since = way[k] < kResting * record.period ? 0 : since + way[k];
-    double square = 0;
     for (std::size_t c = 0; c < valid.size(); ++c)
       if (channels[c].kind == SignalKind::deflection && std::isfinite(declared[c][k]))
-        square += declared[c][k] * declared[c][k];
-    if (square < kFree * kFree || since > kTurnOver * std::sqrt(square)) continue;
+        deflection[k] = std::hypot(deflection[k], declared[c][k]);
+    if (deflection[k] > kFree && way[k] > 0) usual.push_back(way[k]);
+  }
+  if (usual.empty()) return;
+  const auto middle = usual.begin() + static_cast<std::ptrdiff_t>(usual.size() / 2);
+  std::nth_element(usual.begin(), middle, usual.end());
+  double since = 0;
+  for (std::size_t k = 0; k < way.size(); ++k) {
+    since = way[k] < kResting * *middle ? 0 : since + way[k];
+    if (deflection[k] < kFree || since > kTurnOver * deflection[k]) continue;
     for (std::size_t c = 0; c < valid.size(); ++c)
       if (channels[c].kind == SignalKind::deflection) valid[c][k] = 0;
   }

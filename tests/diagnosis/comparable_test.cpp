@@ -82,6 +82,11 @@ TEST(Comparable, NotReadingsOfABallThatRestsUntilItsDragHasTurnedOver) {
   EXPECT_TRUE(flags[0][1001]);
 }
 
+TEST(Comparable, ReadingsOfASlowScan) {
+  const auto flags = RecordedRamp(ramp(0.5e-3)).comparable();
+  EXPECT_EQ(left_out(flags[2]), 80U);  // until 40 um are done
+}
+
 TEST(Comparable, NotReadingsAboutTheMomentOfTouching) {
   RecordedRamp run(ramp(0.05));
   for (std::size_t k = 0; k < 800; ++k) run.measured[2][k] = run.predicted[2][k] = 0;
