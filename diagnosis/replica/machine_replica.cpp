@@ -251,9 +251,9 @@ Deflections MachineReplica::reading_of(const Hypothesis& h, const AxisReplays& a
   const Deflections ball = sum(*ball_of(h, axes), anchor_->ball_offset, 1);
   // Where in their period the signals are is known from the record, wherever the ball is held to
   // be.
-  const Deflections at =
-      signals_err(h.actual) ? sum(sum(anchor_->full.ball, ball, -1), anchor_->off_record, 1)
-                            : Deflections{};
+  const Deflections at = signals_err(h.actual)
+                             ? sum(sum(anchor_->full.ball, ball, -1), anchor_->off_record, 1)
+                             : Deflections{};
   return sum(replay_sensing(h.actual, ball, axes, signals_err(h.actual) ? &at : nullptr),
              anchor_->reading_offset, 1);
 }
