@@ -61,6 +61,8 @@ std::vector<Dimension> dimensions(Kind kind, bool rotary) {
     case Kind::velocity:
       return {rotary ? Dimension::angular_speed : Dimension::speed};
     case Kind::force:
+    case Kind::applied_force:
+    case Kind::added_force:
       return {rotary ? Dimension::torque : Dimension::force};
     case Kind::deflection:
       return {Dimension::length};
@@ -129,7 +131,7 @@ std::string_view place_name(const ImportMap& map, std::string_view axis) {
 }
 
 std::string unit_hint(const MeasuredUnit& unit, Kind kind, bool rotary) {
-  if (kind != Kind::force) return "";
+  if (kind != Kind::force && kind != Kind::applied_force && kind != Kind::added_force) return "";
   if (unit.dimension == Dimension::torque && !rotary)
     return "; of a motor's torque give unit \"N\" and as scale the newtons at the carriage per "
            "newton metre";
@@ -313,6 +315,10 @@ std::string_view to_string(ImportMap::Kind kind) {
       return "velocity";
     case Kind::force:
       return "force";
+    case Kind::applied_force:
+      return "applied_force";
+    case Kind::added_force:
+      return "added_force";
     case Kind::deflection:
       return "deflection";
     case Kind::cosine:

@@ -54,6 +54,8 @@ struct ImportMap {
     twist,           ///< load side minus motor side
     velocity,        ///< of the axis; for checks only
     force,           ///< of the drive on the load: force, torque, or current times a constant
+    applied_force,   ///< known, on the load beside that of the drive
+    added_force,     ///< known, added by the controller to its demand: part of force
     deflection,      ///< of the probe
     cosine,          ///< raw signal of the probe or of an encoder
     sine,
@@ -120,6 +122,8 @@ struct ImportMap {
                     {"twist", Kind::twist},
                     {"velocity", Kind::velocity},
                     {"force", Kind::force},
+                    {"applied_force", Kind::applied_force},
+                    {"added_force", Kind::added_force},
                     {"deflection", Kind::deflection},
                     {"cosine", Kind::cosine},
                     {"sine", Kind::sine},

@@ -201,6 +201,12 @@ class Importer {
       case Kind::force:
         signal.kind = SignalKind::force;
         break;
+      case Kind::applied_force:
+        signal.kind = SignalKind::applied_force;
+        break;
+      case Kind::added_force:
+        signal.kind = SignalKind::added_force;
+        break;
       case Kind::deflection:
         signal.kind = SignalKind::deflection;
         break;

@@ -20,15 +20,17 @@ namespace vcnc {
 
 /// What a signal says.
 enum class SignalKind {
-  command,      ///< position the axis was told to have [m or rad]
-  position,     ///< position by the measuring system the loop is closed with [m or rad]
-  twist,        ///< load side minus motor side [m or rad]
-  force,        ///< force of the drive on the load side [N or N m]
-  deflection,   ///< of the probe, one component in the probe's frame [m]
-  cosine,       ///< raw signal of one probe channel or encoder [V, or share of the converter]
-  sine,         ///< as cosine
-  temperature,  ///< [K]
-  clock         ///< time stamps of the device that measured, where it has a clock of its own [s]
+  command,        ///< position the axis was told to have [m or rad]
+  position,       ///< position by the measuring system the loop is closed with [m or rad]
+  twist,          ///< load side minus motor side [m or rad]
+  force,          ///< force of the drive on the load side [N or N m]
+  applied_force,  ///< known force on the load beside that of its drive [N or N m]
+  added_force,    ///< known part of the drive's force that its loops did not ask for [N or N m]
+  deflection,     ///< of the probe, one component in the probe's frame [m]
+  cosine,         ///< raw signal of one probe channel or encoder [V, or share of the converter]
+  sine,           ///< as cosine
+  temperature,    ///< [K]
+  clock           ///< time stamps of the device that measured, where it has a clock of its own [s]
 };
 
 constexpr bool is_compared(SignalKind q) {

@@ -164,12 +164,15 @@ class Checker {
       const bool is_constant = constant(s.value);
       const bool raw = s.kind == SignalKind::cosine || s.kind == SignalKind::sine;
       if (is_compared(s.kind) || raw) ++compared, still += is_constant;
-      if (is_constant && s.kind != SignalKind::temperature)
+      const bool told = s.kind == SignalKind::applied_force || s.kind == SignalKind::added_force;
+      if (is_constant && s.kind != SignalKind::temperature && !told)
         warn(fmt::format("{} is constant; nothing can be learnt from it", name(s)));
+      if (told && !record_.find(SignalKind::command, s.axis))
+        warn(fmt::format("{} is not used: no command of {} is known", name(s), kAxisNames[s.axis]));
       if (is_constant) continue;
       s.resolution = resolution_of(s.value);
       const double steps = s.resolution > 0 ? spread_of(s.value).span() / s.resolution : HUGE_VAL;
-      if (steps < kFewestSteps && s.kind != SignalKind::temperature)
+      if (steps < kFewestSteps && s.kind != SignalKind::temperature && !told)
         warn(fmt::format("{} comes in {:.0f} coarse steps of {:.3g} (SI)", name(s), steps,
                          s.resolution));
       if (s.kind == SignalKind::force || s.kind == SignalKind::deflection || raw) check_ends(s);

@@ -7,11 +7,13 @@ namespace vcnc {
 
 namespace {
 
-constexpr std::array<std::pair<SignalKind, std::string_view>, 9> kKindNames{{
+constexpr std::array<std::pair<SignalKind, std::string_view>, 11> kKindNames{{
     {SignalKind::command, "command"},
     {SignalKind::position, "position"},
     {SignalKind::twist, "twist"},
     {SignalKind::force, "force"},
+    {SignalKind::applied_force, "applied force"},
+    {SignalKind::added_force, "added force"},
     {SignalKind::deflection, "deflection"},
     {SignalKind::cosine, "cosine"},
     {SignalKind::sine, "sine"},

@@ -15,10 +15,12 @@ namespace {
 
 constexpr double kSame = 5e-6;          // [m or rad] between commands of equal laps
 constexpr double kSameRoughly = 50e-6;  // [m or rad] between stretches of one condition
-constexpr double kShortestLap = 0.1;    // [s]
-constexpr double kLeastTravel = 2e-3;   // [m or rad] of a lap
-constexpr double kSearchStep = 20e-3;   // [s] between samples at which a lap may begin
-constexpr std::size_t kShares = 16;     // at which stretches are compared
+constexpr double kSameForces =
+    0.05;  // share of known forces that those of another lap may differ by
+constexpr double kShortestLap = 0.1;   // [s]
+constexpr double kLeastTravel = 2e-3;  // [m or rad] of a lap
+constexpr double kSearchStep = 20e-3;  // [s] between samples at which a lap may begin
+constexpr std::size_t kShares = 16;    // at which stretches are compared
 
 /// The commanded motion as a curve in the space of the axes.
 class Curve5 {
@@ -71,6 +73,19 @@ class Curve5 {
       square += v * v;
     }
     return static_cast<double>(j) + (square > 0 ? std::clamp(way / square, -1.0, 1.0) : 0);
+  }
+  /// Whether `count` samples from i and from j on know of the same forces.
+  bool same_forces(std::size_t i, std::size_t j, std::size_t count) const {
+    double off = 0, all = 0;
+    for (const std::size_t axis : axes_) {
+      if (motion_.force[axis].empty()) continue;
+      for (std::size_t k = 0; k < count; ++k) {
+        const KnownForce &a = motion_.force[axis][i + k], &b = motion_.force[axis][j + k];
+        off += std::pow(a.added - b.added, 2) + std::pow(a.applied - b.applied, 2);
+        all += std::pow(a.added, 2) + std::pow(a.applied, 2);
+      }
+    }
+    return off <= kSameForces * kSameForces * all;
   }
 
  private:
@@ -192,7 +207,7 @@ class Segmentation {
       const double blur = 2 * curve_.speed(i) * curve_.period();  // laps begin between samples
       if (curve_.distance(i, at) > kSameRoughly + blur) return false;
     }
-    return true;
+    return curve_.same_forces(a.begin, b.begin, std::min(a.end - a.begin, b.end - b.begin));
   }
 
   void number() {

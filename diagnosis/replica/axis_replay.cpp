@@ -113,7 +113,8 @@ std::vector<AxisReplay> replay_lanes(AxisDriveOf<Real>& drive, std::size_t axis,
     measured[n][0] = commands.start()[axis];
   }
   const double full_force = variants[0].hypothesis.axes[axis].mechanics.force_limit;
-  const bool can_rest = drive.can_rest();
+  const std::vector<KnownForce>& known = motion.force[axis];
+  const bool can_rest = drive.can_rest() && known.empty();
   bool rests = false;
   Rest<Real> rest;
   AxisCycleOf<Real> cycle;
@@ -123,6 +124,7 @@ std::vector<AxisReplay> replay_lanes(AxisDriveOf<Real>& drive, std::size_t axis,
       drive.rest();
     } else {
       drive.tell_commands(command.position, command.velocity);
+      if (!known.empty()) drive.tell_force(known[k]);
       cycle = drive.follow({Real(command.position[axis]), Real(command.velocity[axis])});
       rests = rest.comes(command, cycle, axis) && can_rest;
     }

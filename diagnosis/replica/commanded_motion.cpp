@@ -39,6 +39,22 @@ void round_to(std::vector<double>& value, double step) {
     for (double& v : value) v = std::round(v / step) * step;
 }
 
+/// Known forces on an axis.
+std::vector<KnownForce> forces(const Record& record, std::size_t axis, std::vector<char>& known,
+                               std::size_t settling) {
+  std::vector<KnownForce> all;
+  const auto take = [&](SignalKind kind, double KnownForce::*part) {
+    const MeasuredSignal* signal = record.find(kind, axis);
+    if (signal == nullptr) return;
+    all.resize(signal->value.size());
+    const std::vector<double> value = bridged(signal->value, known, settling);
+    for (std::size_t k = 0; k < all.size(); ++k) all[k].*part = value[k];
+  };
+  take(SignalKind::applied_force, &KnownForce::applied);
+  take(SignalKind::added_force, &KnownForce::added);
+  return all;
+}
+
 }  // namespace
 
 std::vector<double> spline_derivative(const std::vector<double>& y, double h) {
@@ -77,6 +93,7 @@ CommandedMotion commanded_motion(const Record& record) {
     }
     motion.position[axis] = bridged(signal->value, motion.known, settling);
     motion.velocity[axis] = spline_derivative(motion.position[axis], record.period);
+    motion.force[axis] = forces(record, axis, motion.known, settling);
     if (motion.told[axis] != CommandedMotion::Told::command) continue;
     if (std::abs(motion.velocity[axis].front()) > kStandingStart) {
       const auto starting = static_cast<std::size_t>(std::ceil(kStarting / record.period));

@@ -1,5 +1,5 @@
 // The motion that a record's machine was told to make: position and velocity of every axis at every
-// sample, as the drives need them.
+// sample, as the drives need them, and the forces on it that are known.
 //
 // A sample that is missing is bridged by a straight line (and said so), because a drive was told
 // something. Velocity: derivative of the cubic spline (natural ends) through the positions; its
@@ -11,6 +11,7 @@
 
 #include "diagnosis/records/record.hpp"
 #include "model/axes.hpp"
+#include "model/drive/axis_drive.hpp"
 
 namespace vcnc {
 
@@ -23,6 +24,7 @@ struct CommandedMotion {
   };
   PerAxis<Told> told{};
   PerAxis<std::vector<double>> position, velocity;  ///< one per sample; empty where nothing is told
+  PerAxis<std::vector<KnownForce>> force;           ///< one per sample; empty: none
   std::vector<char> known;  ///< false: bridged, soon after, or a begin in motion
 
   AxisVector start(const AxisVector& declared) const;

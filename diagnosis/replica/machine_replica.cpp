@@ -37,6 +37,9 @@ CommandedMotion at_cycles(const CommandedMotion& motion, double period) {
       const double c = 3 * way - 2 * b - b_end, d = b + b_end - 2 * way;
       result.position[axis].push_back(x[i] + s * (b + s * (c + s * d)));
       result.velocity[axis].push_back((b + s * (2 * c + s * 3 * d)) / period);
+      if (const std::vector<KnownForce>& f = motion.force[axis]; !f.empty())
+        result.force[axis].push_back({std::lerp(f[i].added, f[i + 1].added, s),
+                                      std::lerp(f[i].applied, f[i + 1].applied, s)});
     }
   }
   return result;

@@ -1,10 +1,14 @@
 #include "diagnosis/search/differential.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 #include <utility>
 
+#include "diagnosis/records/measured_table.hpp"
+#include "diagnosis/records/signal_name.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/fitted_machine.hpp"
 #include "diagnosis/search/freed_number.hpp"
@@ -102,10 +106,22 @@ bool unlike(const std::vector<LapEvent>& events, const MeasuredSignal& signal, s
   });
 }
 
+/// Laps under other forces are no repetitions of the same.
+void check_known_forces(const Record& now, const Record& healthy) {
+  for (const SignalKind kind : {SignalKind::applied_force, SignalKind::added_force})
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      if (!now.find(kind, axis) != !healthy.find(kind, axis))
+        throw MeasurementError(
+            fmt::format("{}: {} is known here and not in {}; a healthy run needs the same forces",
+                        (now.find(kind, axis) ? now : healthy).source, signal_name(kind, axis),
+                        (now.find(kind, axis) ? healthy : now).source));
+}
+
 }  // namespace
 
 DifferentialRecord less_healthy(const Record& now, const Record& healthy, Replica& of_healthy,
                                 const Machine& declared) {
+  check_known_forces(now, healthy);
   const Clamped clamped = as_clamped(healthy, of_healthy, declared);
   DifferentialRecord result{.record = now, .noise = clamped.noise, .healthy = clamped.machine};
   const Prediction predicted = of_healthy.predict(result.healthy);

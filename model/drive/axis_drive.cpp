@@ -113,7 +113,7 @@ AxisDriveOf<Real>::AxisDriveOf(const AxisParams& declared, const AxisParams& act
   kp *= servo.velocity_gain;
   kp_ = kp;
   if (actual.servo.controller == ServoParams::Controller::sampled)
-    sampled_.emplace(kp, inertia, actual.servo.dead_time, start);
+    sampled_.emplace_back(kp, inertia, actual.servo.dead_time, start);
   lag_share_ = servo.current_lag > 0 ? -std::expm1(-kPlantTime / servo.current_lag) : 1;
   position_share_ = share_of(actual.servo.position_lag);
   velocity_share_ = share_of(actual.servo.velocity_lag);
@@ -138,6 +138,7 @@ AxisDriveOf<Real>::AxisDriveOf(std::vector<AxisDriveOf<double>> drives)
       (set_lane(std::get<n>(to), i, std::get<n>(from)), ...);
     }
     (std::make_index_sequence<std::tuple_size_v<decltype(to)>>());
+    sampled_.insert(sampled_.end(), drive.sampled_.begin(), drive.sampled_.end());
     if (i >= drives.size()) continue;
     reception_.set(i, std::move(drive.reception_.chain(0)));
     shaping_.set(i, std::move(drive.shaping_.chain(0)));
@@ -153,7 +154,8 @@ template <class Real>
 bool AxisDriveOf<Real>::suits(const AxisDriveOf& other) const {
   return axis_ == other.axis_ && feedback_ == other.feedback_ &&
          travel_per_turn_ == other.travel_per_turn_ && force_limit_ == other.force_limit_ &&
-         two_masses_ == other.two_masses_ && laws_ == other.laws_ && !sampled_ && !other.sampled_;
+         two_masses_ == other.two_masses_ && laws_ == other.laws_ &&
+         sampled_.empty() == other.sampled_.empty();
 }
 
 template <class Real>
@@ -315,11 +317,14 @@ AxisCycleOf<Real> AxisDriveOf<Real>::run(const Course& course) {
     if (laws_) update_motions(0);
     Setpoint next = course[i + 1];
     if (shaped) shape(next, (next.velocity - course[i].velocity) / kDriveLoopTime, 1);
-    if (!sampled_) force_ref_ = control(now, next);
+    if (sampled_.empty()) force_ref_ = control(now, next);
     const Real velocity_before = v_load_;
     Real mean_force{};
     for (plant_step_ = 0; plant_step_ < kPlantStepsPerLoop; ++plant_step_) {
-      if (sampled_) force_ref_ = force_demanded();
+      if (!sampled_.empty())  // what its force is on average over the plant step
+        force_ref_ = of_sampled([&](const SampledController& c) {
+          return c.force(loop_ * kDriveLoopTime + plant_step_ * kPlantTime, kPlantTime);
+        });
       force_ += lag_share_ * (force_ref_ - force_);
       mean_force += force_ / kPlantStepsPerLoop;
       move_plant();
@@ -335,11 +340,9 @@ AxisCycleOf<Real> AxisDriveOf<Real>::run(const Course& course) {
   cycle.measured = feedback_ == ServoParams::Feedback::motor ? motor : load;
   cycle.second = load - motor;
   cycle.force = force_ / force_limit_;
-  if constexpr (std::is_same_v<Real, double>) {
-    if (sampled_) {
-      sampled_->sample(servo_, now.position, now.velocity, cycle.measured);
-      cycle.force = sampled_->demand() / force_limit_;
-    }
+  if (!sampled_.empty()) {
+    sample(now, cycle.measured);
+    cycle.force = of_sampled([](const SampledController& c) { return c.demand(); }) / force_limit_;
   }
   cycle.velocity = observer_.velocity();
   return cycle;
@@ -354,17 +357,29 @@ Real AxisDriveOf<Real>::control(const Setpoint& now, const Setpoint& next) {
   velocity_ = lagged(velocity_, observer_.velocity(), velocity_share_);
   const Real error = v_ref - velocity_;
   const Real a_c = (next.velocity - now.velocity) / kDriveLoopTime;
-  const Real force = kp_ * error + integral_ + servo_.acceleration_ff * inertia_ * a_c;
+  Real force = kp_ * error + integral_ + servo_.acceleration_ff * inertia_ * a_c;
+  if (force_known_) force += known(&KnownForce::added, loop_);
   const Real limited = min(max(force, -servo_.force_limit), servo_.force_limit);
   integral_ = choose(force == limited,
                      integral_ + kp_ / servo_.integral_time * error * kDriveLoopTime, integral_);
   return limited;
 }
 
-/// What the sampled controller's force is on average over the current plant step.
 template <class Real>
-Real AxisDriveOf<Real>::force_demanded() const {
-  return sampled_->force(loop_ * kDriveLoopTime + plant_step_ * kPlantTime, kPlantTime);
+void AxisDriveOf<Real>::sample(const Setpoint& now, Real measured) {
+  for (std::size_t i = 0; i < sampled_.size(); ++i)
+    sampled_[i].sample({.kv = lane(servo_.kv, i),
+                        .velocity_ff = lane(servo_.velocity_ff, i),
+                        .acceleration_ff = lane(servo_.acceleration_ff, i),
+                        .force_limit = lane(servo_.force_limit, i)},
+                       lane(now.position, i), lane(now.velocity, i), lane(measured, i),
+                       force_told_.added);
+}
+
+/// At a time within the current cycle [loop steps].
+template <class Real>
+double AxisDriveOf<Real>::known(double KnownForce::*force, double loop) const {
+  return std::lerp(force_before_.*force, force_told_.*force, loop / kDriveLoopSteps);
 }
 
 template <class Real>
@@ -380,8 +395,10 @@ void AxisDriveOf<Real>::move_plant() {
                         .axes = motions(i)});
     set_lane(force, i, signal.force);
   });
+  if (force_known_)
+    load_force_ = known(&KnownForce::applied, loop_ + (plant_step_ + 0.5) / kPlantStepsPerLoop);
   load_.each_active([&](Chain<LoadForcePort>& chain, std::size_t i) {
-    LoadForcePort::Signal<double> signal;
+    LoadForcePort::Signal<double> signal{force_known_ ? lane(load_force_, i) : 0};
     chain.step(signal, {moment(kPlantTime, kPlantStepsPerLoop, plant_step_), lane(x_load_, i),
                         lane(v_load_, i), motions(i)});
     set_lane(load_force_, i, signal.force);

@@ -6,11 +6,11 @@
 //
 // Every 100 us (loop step, T), at its instant t:
 //   v_ref = Kv e + kvff v_c,   e: x_c - x_m behind a first-order lag tau_x
-//   F_ref = Kp (v_ref - v) + (Kp/Ti) int (v_ref - v) dt + kaff J a_c,   v: v_m behind a lag tau_v
-//   |F_ref| <= F_max; the integral is held while the force is limited
-//   Kp    = 2 pi f_v J,  J = load + reflected motor inertia
-//   a_c   = (v_c(t + T) - v_c(t)) / T, the acceleration that the coming step needs on average
-//   x_m by the measuring system chosen (motor or load); v_m always of the motor side
+//   F_ref = Kp (v_ref - v) + (Kp/Ti) int (v_ref - v) dt + kaff J a_c + F_a,   v: v_m behind a lag
+//   tau_v |F_ref| <= F_max; the integral is held while the force is limited Kp    = 2 pi f_v J,  J
+//   = load + reflected motor inertia a_c   = (v_c(t + T) - v_c(t)) / T, the acceleration that the
+//   coming step needs on average F_a   what somebody adds to the demand, a straight line over the
+//   bus cycle x_m by the measuring system chosen (motor or load); v_m always of the motor side
 //
 // Velocity v_m: an observer with position, velocity and disturbance (three equal poles at 4 x the
 // velocity loop's crossover) is driven by the measured motor position and the drive force. In
@@ -33,7 +33,8 @@
 // 0.3 um on 500 kg). Friction implicitly (model/drive/friction.hpp).
 //
 // Where the effects of model/effects/ act: set-points as received and as used, gains, force of the
-// motor, spring (K, b), further force on the load, friction F_f, the position a measuring system
+// motor, spring (K, b), further force on the load (besides one that is known: a straight line over
+// the bus cycle), friction F_f, the position a measuring system
 // counts, and what the tool centre is off the scale (true position = load + displacement). The
 // controller knows the declared masses; the plant has the actual ones.
 //
@@ -72,6 +73,12 @@ struct AxisSetpointOf {
   Real position{}, velocity{};
 };
 using AxisSetpoint = AxisSetpointOf<double>;
+
+/// Forces of which an axis is told, at the end of a cycle [N or N m].
+struct KnownForce {
+  double added = 0;    ///< by the controller to its demand: part of the force it reports
+  double applied = 0;  ///< to the load from outside
+};
 
 /// What one cycle of the drive brought about.
 template <class Real>
@@ -178,7 +185,7 @@ class AxisDriveOf {
   /// the tool centre, on slow functions of time: then a drive that has come to rest stays so. One
   /// with a gap may begin to hunt.
   bool can_rest() const {
-    return !laws_ && !sampled_ && !reception_.some_active() && !shaping_.some_active() &&
+    return !laws_ && sampled_.empty() && !reception_.some_active() && !shaping_.some_active() &&
            all(half_gap_ == Real(0));
   }
   /// A cycle at rest: nothing changes but the time.
@@ -187,6 +194,13 @@ class AxisDriveOf {
   /// Commanded positions and velocities of all axes for the end of the coming cycle: what a law of
   /// this axis may know of the others. Call it before follow().
   void tell_commands(const AxisVector& position, const AxisVector& velocity);
+
+  /// Known forces at the end of the coming cycle; call it before every follow(), or never.
+  void tell_force(const KnownForce& force) {
+    force_before_ = force_known_ ? force_told_ : force;
+    force_told_ = force;
+    force_known_ = true;
+  }
 
   /// Takes what is measured for the set-point: braking after a following error starts where the
   /// axis is, not where it was told to be.
@@ -212,7 +226,15 @@ class AxisDriveOf {
   Cycle run(const Course& course);
   void shape(Setpoint& setpoint, Real acceleration, int step);
   Real control(const Setpoint& now, const Setpoint& next);
-  Real force_demanded() const;
+  double known(double KnownForce::*force, double loop) const;
+  void sample(const Setpoint& now, Real measured);
+  /// One number of the sampled controllers.
+  template <class F>
+  Real of_sampled(F&& f) const {
+    Real all{};
+    for (std::size_t i = 0; i < sampled_.size(); ++i) set_lane(all, i, f(sampled_[i]));
+    return all;
+  }
   void move_plant();
   void move_rigid(Real force, Real load_force);
   void move_two_masses(Real force, Real load_force);
@@ -260,10 +282,12 @@ class AxisDriveOf {
   Real position_error_{}, velocity_{}, force_ref_{}, force_{}, integral_{}, load_force_{};
   Setpoint last_raw_, last_shaped_;
   AxisVector told_position_{}, told_velocity_{}, before_position_{}, before_velocity_{};
+  bool force_known_ = false;  ///< tell_force() was called
+  KnownForce force_told_, force_before_;
   PerLane<Real, Motions<double>> motions_{};
   FrictionOf<Real> friction_;
   VelocityObserverOf<Real> observer_;
-  std::optional<SampledController> sampled_;  ///< in place of the cascade; never in lanes
+  std::vector<SampledController> sampled_;  ///< one per lane, in place of the cascade, or none
 
   auto numbers() {
     return std::tuple_cat(

@@ -17,11 +17,12 @@ SampledController::SampledController(double velocity_gain, double inertia, doubl
 }
 
 void SampledController::sample(const ServoPort::Signal<double>& gains, double position,
-                               double velocity, double measured) {
+                               double velocity, double measured, double added) {
   const double v = (measured - measured_2_) / (2 * kPeriod);
   const double v_ref = gains.kv * (position - measured) + gains.velocity_ff * velocity;
   const double a_c = (velocity - velocity_1_) / kPeriod;
-  const double force = velocity_gain_ * (v_ref - v) + gains.acceleration_ff * inertia_ * a_c;
+  const double force =
+      velocity_gain_ * (v_ref - v) + gains.acceleration_ff * inertia_ * a_c + added;
   newest_ = (newest_ + 1) % kKept;
   demand_[newest_] = std::clamp(force, -gains.force_limit, gains.force_limit);
   measured_2_ = measured_1_;

@@ -2,8 +2,8 @@
 // proportional in position and velocity, velocity differenced from the measured position.
 //
 //   v(k) = (x_f(k) - x_f(k-1)) / T,   x_f(k) = (x_m(k) + x_m(k-1)) / 2
-//   u(k) = Kp (Kv (x_c(k) - x_m(k)) + kvff v_c(k) - v(k)) + kaff J (v_c(k) - v_c(k-1)) / T
-//   |u| <= F_max
+//   u(k) = Kp (Kv (x_c(k) - x_m(k)) + kvff v_c(k) - v(k)) + kaff J (v_c(k) - v_c(k-1)) / T + F_a(k)
+//   |u| <= F_max;  F_a: what somebody adds to the demand
 // The force is u(k) from k T + d on, until u(k+1) takes over: a hold of one cycle after a dead time
 // d. What a drive reports as its force is the demand u(k).
 //
@@ -31,9 +31,9 @@ class SampledController {
   /// `inertia`: what acceleration feed-forward takes the axis to have; at rest at `position`.
   SampledController(double velocity_gain, double inertia, double dead_time, double position);
 
-  /// Sample k: what is commanded and what is measured, at the end of a cycle.
+  /// Sample k: what is commanded, measured and added to the demand, at the end of a cycle.
   void sample(const ServoPort::Signal<double>& gains, double position, double velocity,
-              double measured);
+              double measured, double added = 0);
   /// u of the last sample.
   double demand() const { return demand_[newest_]; }
   /// Mean force from `begin` to `begin + dt` [s] after the last sample, within one cycle.

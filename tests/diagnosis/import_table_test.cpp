@@ -378,5 +378,25 @@ TEST_F(RecordFile, AChangedOrForeignFileIsRefused) {
   }
 }
 
+TEST(ImportTable, KnownForcesMayBeConstantAndNeedACommand) {
+  auto all = columns();
+  all["push"] = [](double t) { return t > 1 ? 40.0 : 0.0; };
+  all["none"] = [](double) { return 0.0; };
+  const std::string pushed = signal("push", "applied_force", "X", "N", "scale = 2");
+  const Record r =
+      imported(sound_map() + pushed + signal("none", "added_force", "X", "N"), table_of(all));
+  ASSERT_TRUE(r.find(SignalKind::applied_force, kX));
+  EXPECT_NEAR(r.find(SignalKind::applied_force, kX)->value.back(), 80, 1e-3);
+  ASSERT_TRUE(r.find(SignalKind::added_force, kX));
+  const auto speaks_of = [](const Record& run, const std::string& words) {
+    return std::any_of(run.warnings.begin(), run.warnings.end(),
+                       [&](const std::string& w) { return w.find(words) != std::string::npos; });
+  };
+  EXPECT_FALSE(speaks_of(r, "push") || speaks_of(r, "none"));
+  const Record without =
+      imported(kTime + signal("pos", "position", "X", "m") + pushed, table_of(all));
+  EXPECT_TRUE(speaks_of(without, "not used: no command of X"));
+}
+
 }  // namespace
 }  // namespace vcnc

@@ -113,6 +113,45 @@ TEST(MachineReplica, IsFullAtItsAnchor) {
       same_bits(replica.predict(run.true_machine), replica.predict_in_full(run.true_machine)));
 }
 
+/// A force that is known moves the axis as a law of the machine does.
+TEST(MachineReplica, KnownForcesAct) {
+  const RecordedRun& run = reversals();
+  Law law;
+  law.over = Covariate::time;
+  Record record = run.record;
+  std::vector<double> force(record.samples(), 0.0);
+  for (std::size_t n = 0; n < 5; ++n) {
+    const auto at = static_cast<double>(1000 + 700 * n);
+    for (const auto& [ms, newtons] :
+         {std::pair{at, 0.0}, {at + 10, 80.0}, {at + 60, 80.0}, {at + 70, 0.0}}) {
+      law.at.push_back(ms * 1e-3);
+      law.value.push_back(newtons);
+    }
+    for (std::size_t k = 0; k <= 70; ++k)
+      force[1000 + 700 * n + k] =
+          std::min({80.0, 8.0 * static_cast<double>(k), 8.0 * static_cast<double>(70 - k)});
+  }
+  Machine pushed = run.true_machine;
+  pushed.effects.laws.push_back(law);
+  record.signals.push_back({SignalKind::applied_force, kX, "push", force, 0});
+  const Prediction expected = run.replica().predict_in_full(pushed),
+                   without = run.replica().predict_in_full(run.true_machine),
+                   known = MachineReplica(record, run.declared, run.piece)
+                               .predict_in_full(run.true_machine);
+  ASSERT_EQ(known.size(), expected.size());
+  for (std::size_t c = 0; c < known.size(); ++c) {
+    double moved = 0, off = 0;
+    for (std::size_t k = 0; k < known[c].size(); ++k) {
+      if (std::isnan(expected[c][k])) continue;
+      moved = std::max(moved, std::abs(expected[c][k] - without[c][k]));
+      off = std::max(off, std::abs(expected[c][k] - known[c][k]));
+    }
+    EXPECT_LE(off, 0.02 * moved) << c;
+    const bool of_x = run.replica().channels()[c] == ComparedChannel{SignalKind::position, kX};
+    EXPECT_TRUE(!of_x || moved > 1e-7);
+  }
+}
+
 /// A piece that lies a quarter of a wave of the error elsewhere than the model knows, wherever a
 /// hypothesis lets it lie.
 TEST(MachineReplica, SignalErrorsAreThoseOfTheDeflectionThatWasMeasured) {

@@ -43,6 +43,28 @@ class Motion2 {
   std::vector<double> x_{0.02}, y_{0};
 };
 
+TEST(Stretches, LapsUnderOtherForcesAreNoRepetitions) {
+  Motion2 m;
+  m.stand(0.3);
+  m.laps(0.02, 1.2, 4.02);
+  m.stand(0.3);
+  Record r = m.record();
+  const std::size_t pulse = 1200 + 700;  // in the second of four laps
+  std::vector<double> force(m.size(), 0.0);
+  for (std::size_t k = 0; k < 10; ++k) force[300 + pulse + k] = 50;
+  for (const SignalKind kind : {SignalKind::applied_force, SignalKind::added_force}) {
+    r.signals.resize(2);
+    r.signals.push_back({kind, kX, "f", force, 0});
+    std::vector<Stretch> laps;
+    for (const Stretch& one : stretches_of(r))
+      if (one.end - one.begin > 1000) laps.push_back(one);
+    ASSERT_EQ(laps.size(), 4u);
+    EXPECT_NE(laps[0].condition, laps[1].condition);
+    EXPECT_EQ(laps[0].condition, laps[2].condition);
+    EXPECT_EQ(laps[0].condition, laps[3].condition);
+  }
+}
+
 TEST(Stretches, LapsThatAreNoWholeNumberOfSamplesAreFound) {
   Motion2 m;
   m.stand(0.3);

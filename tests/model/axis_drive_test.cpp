@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <stdexcept>
 #include <vector>
 
@@ -409,45 +410,100 @@ TEST(AxisDrive, SameInputsSameBits) {
 }
 
 // Variants of one axis side by side, with and without bristles, with and without effects at every
-// port of the drive.
-TEST(AxisDriveLanes, ComeToTheSameBitsAsAlone) {
-  for (const bool two_masses : {false, true}) {
-    std::vector<AxisEffects> effects(kLanes);
-    std::vector<AxisParams> params;
-    for (std::size_t i = 0; i < kLanes; ++i) {
-      params.push_back(axis(40 + static_cast<double>(i), 1, 0.9));
-      if (i > 0) effects[i] = friction();
-      if (two_masses) effects[i].get<Windup>().compliance = 1e-9 * static_cast<double>(i + 1);
-    }
-    effects[2].get<Presliding>().stiffness = 2e7;
-    effects[3].get<Cogging>().amplitude = 20;
-    effects[4].get<PitchPeriodic>().amplitude = 1e-6;
-    effects[5].get<CommandDelay>() = CommandDelay::nominal(false);
-    effects[6].get<EncoderSubdivision>() = EncoderSubdivision::nominal(false);
-    effects[7].get<CableChain>() = CableChain::nominal(false);
-    params[1].mechanics.load *= 1.1;
-    const auto drive = [&](std::size_t i) { return AxisDrive(params[i], effects[i]); };
-    const std::size_t used = two_masses ? kLanes : kLanes - 1;  // not all need be used
-    std::vector<AxisDrive> alone, together;
+// port of the drive, under a known force; `sampled` ones with other dead times.
+void expect_lanes_as_alone(bool two_masses, bool sampled) {
+  std::vector<AxisEffects> effects(kLanes);
+  std::vector<AxisParams> params;
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    params.push_back(axis(40 + static_cast<double>(i), 1, 0.9));
+    if (i > 0) effects[i] = friction();
+    if (two_masses) effects[i].get<Windup>().compliance = 1e-9 * static_cast<double>(i + 1);
+  }
+  effects[2].get<Presliding>().stiffness = 2e7;
+  effects[3].get<Cogging>().amplitude = 20;
+  effects[4].get<PitchPeriodic>().amplitude = 1e-6;
+  effects[5].get<CommandDelay>() = CommandDelay::nominal(false);
+  effects[6].get<EncoderSubdivision>() = EncoderSubdivision::nominal(false);
+  effects[7].get<CableChain>() = CableChain::nominal(false);
+  params[1].mechanics.load *= 1.1;
+  for (std::size_t i = 0; sampled && i < kLanes; ++i) {
+    params[i].servo.controller = ServoParams::Controller::sampled;
+    params[i].servo.velocity_bandwidth = 20;
+    params[i].servo.dead_time = 0.13e-3 * static_cast<double>(i);
+  }
+  const auto drive = [&](std::size_t i) { return AxisDrive(params[i], effects[i]); };
+  const std::size_t used = two_masses ? kLanes : kLanes - 1;  // not all need be used
+  std::vector<AxisDrive> alone, together;
+  for (std::size_t i = 0; i < used; ++i) {
+    alone.push_back(drive(i));
+    together.push_back(drive(i));
+  }
+  AxisDriveLanes lanes(std::move(together));
+  for (int k = 1; k <= 1000; ++k) {
+    const double angle = 2 * kPi * k / 400;
+    const double x = 2e-3 * (1 - std::cos(angle)), v = 2e-3 * 2 * kPi / 0.4 * std::sin(angle);
+    const KnownForce known{.added = 30 * std::sin(0.05 * k), .applied = k % 100 < 50 ? 20.0 : 0};
+    lanes.tell_force(known);
+    const AxisDriveLanes::Cycle cycles = lanes.follow({x, v});
     for (std::size_t i = 0; i < used; ++i) {
-      alone.push_back(drive(i));
-      together.push_back(drive(i));
-    }
-    AxisDriveLanes lanes(std::move(together));
-    for (int k = 1; k <= 1000; ++k) {
-      const double angle = 2 * kPi * k / 400;
-      const double x = 2e-3 * (1 - std::cos(angle)), v = 2e-3 * 2 * kPi / 0.4 * std::sin(angle);
-      const AxisDriveLanes::Cycle cycles = lanes.follow({x, v});
-      for (std::size_t i = 0; i < used; ++i) {
-        const AxisCycle cycle = alone[i].follow({x, v});
-        ASSERT_EQ(lane(cycles.measured, i), cycle.measured) << "lane " << i << ", cycle " << k;
-        ASSERT_EQ(lane(cycles.second, i), cycle.second) << "lane " << i << ", cycle " << k;
-        ASSERT_EQ(lane(cycles.force, i), cycle.force) << "lane " << i << ", cycle " << k;
-        for (std::size_t j = 0; j < cycle.truth.size(); ++j)
-          ASSERT_EQ(lane(cycles.truth[j], i), cycle.truth[j]) << "lane " << i << ", cycle " << k;
-      }
+      alone[i].tell_force(known);
+      const AxisCycle cycle = alone[i].follow({x, v});
+      ASSERT_EQ(lane(cycles.measured, i), cycle.measured) << "lane " << i << ", cycle " << k;
+      ASSERT_EQ(lane(cycles.second, i), cycle.second) << "lane " << i << ", cycle " << k;
+      ASSERT_EQ(lane(cycles.force, i), cycle.force) << "lane " << i << ", cycle " << k;
+      for (std::size_t j = 0; j < cycle.truth.size(); ++j)
+        ASSERT_EQ(lane(cycles.truth[j], i), cycle.truth[j]) << "lane " << i << ", cycle " << k;
     }
   }
+}
+
+TEST(AxisDriveLanes, ComeToTheSameBitsAsAlone) {
+  for (const bool two_masses : {false, true})
+    for (const bool sampled : {false, true}) expect_lanes_as_alone(two_masses, sampled);
+}
+
+// A sine of force from outside moves a rigid axis with a cascade as its transfer function says.
+// With C = Kp (1 + 1 / (Ti s)), and a velocity that the observer, three poles at -p, tells less by
+// s (s + 3 p) / (s + p)^3 F / J because it does not know of F, the loops being continuous:
+//   x / F = (1 + C s (s + 3 p) / (J (s + p)^3)) / (J s^2 + C (s + Kv))
+TEST(AxisDrive, AnswersAForceFromOutsideAsItsTransferFunctionSays) {
+  AxisParams params;
+  params.servo.current_lag = 0;
+  const double kp = 2 * kPi * params.servo.velocity_bandwidth * params.mechanics.total_inertia(),
+               kv = params.servo.kv_per_s, ti = params.servo.integral_time,
+               inertia = params.mechanics.total_inertia(), p = 4 * kp / inertia;
+  for (const double f : {1.0, 4.0}) {
+    const std::complex<double> s(0, 2 * kPi * f);
+    const std::complex<double> c = kp * (1.0 + 1.0 / (ti * s)),
+                               unseen = s * (s + 3 * p) / (inertia * std::pow(s + p, 3)),
+                               answer = (1.0 + c * unseen) / (inertia * s * s + c * (s + kv));
+    AxisDrive drive(params);
+    std::complex<double> seen = 0;
+    const int cycles = 4000, from = 2000;  // whole periods
+    for (int k = 1; k <= cycles; ++k) {
+      const double phase = 2 * kPi * f * k * 1e-3;
+      drive.tell_force({.applied = 100 * std::sin(phase)});
+      const double moved = drive.hold().measured;
+      if (k > from) seen += moved * std::polar(1.0, -phase);
+    }
+    seen *= std::complex<double>(0, 2.0 / (cycles - from)) / 100.0;  // of a sine
+    EXPECT_NEAR(std::abs(seen / answer), 1, 0.01) << f;
+    EXPECT_NEAR(std::arg(seen / answer), 0, 0.01) << f;
+  }
+}
+
+TEST(AxisDrive, TakesBackWhatIsAddedToItsForce) {
+  AxisDrive drive{AxisParams{}};
+  AxisCycle cycle;
+  double farthest = 0;
+  for (int k = 0; k < 3000; ++k) {
+    drive.tell_force({.added = k < 10 ? 0.0 : 200});
+    cycle = drive.hold();
+    farthest = std::max(farthest, cycle.measured);
+  }
+  EXPECT_GT(farthest, 1e-7);
+  EXPECT_NEAR(cycle.measured, 0, 1e-12);  // the integrator holds against it
+  EXPECT_NEAR(cycle.force, 0, 1e-9);
 }
 
 }  // namespace

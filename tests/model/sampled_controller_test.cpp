@@ -135,6 +135,35 @@ TEST(SampledController, StandsBackByLoadAndSpeed) {
   }
 }
 
+// At rest: what acts on the load from outside is held by the demand, what is added to the demand is
+// taken back by the loops.
+TEST(SampledController, StandsBackByKnownForces) {
+  for (const bool outside : {true, false}) {
+    AxisDrive drive(sampled_axis(0.3e-3));
+    AxisCycle cycle;
+    for (int k = 0; k < 2000; ++k) {
+      drive.tell_force(outside ? KnownForce{.applied = 30} : KnownForce{.added = 30});
+      cycle = drive.hold();
+    }
+    EXPECT_NEAR(cycle.measured, 30 / (8557.0 * 160), 1e-12);
+    EXPECT_NEAR(cycle.force * 350, outside ? -30 : 0, 1e-6);
+  }
+}
+
+// What is added at a sample acts after the dead time, as the demand does.
+TEST(SampledController, WhatIsAddedComesLateByTheDeadTime) {
+  AxisParams params = sampled_axis(5e-3);
+  AxisDrive drive(params);
+  std::vector<double> moved;
+  for (int k = 0; k < 10; ++k) {
+    drive.tell_force({.added = k == 2 ? 100.0 : 0});
+    moved.push_back(drive.hold().measured);
+  }
+  EXPECT_EQ(moved[7], 0);                                         // sample 2, 5 ms later
+  EXPECT_NEAR(moved[8], 0.5 * 100 / 95.0 * kT * kT, 1e-12);       // a cycle of it
+  EXPECT_NEAR(moved[9] - moved[8], 100 / 95.0 * kT * kT, 1e-12);  // and away
+}
+
 TEST(SampledController, ForceStaysWithinItsLimit) {
   AxisDrive drive(sampled_axis(1e-3));
   double most = 0;
