@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <map>
 
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/replica/model_comparison.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/refit.hpp"
@@ -20,6 +22,7 @@ constexpr double kFixed = 1e12;  ///< precision of a number that stays
 /// What an effect of the probe or the geometry must explain of what is left: less than that is the
 /// form of the contact.
 constexpr double kShareOfMeasuring = 0.05;
+constexpr double kNearly = 0.95;  ///< of the most that one promises: as good
 
 /// Effects of an axis that are fitted together, or its lags.
 struct FrictionLaw {
@@ -224,6 +227,20 @@ class Commissioner {
     accept(std::move(trials[law]), place, kFrictionLaws[law].name);
   }
 
+  /// Of those that promise nearly the most, the first with the fewest numbers.
+  std::ptrdiff_t simplest_of_best(const std::vector<std::size_t>& candidates,
+                                  const std::vector<double>& promise) const {
+    const auto first = std::min_element(promise.begin(), promise.end());
+    const double enough = machine_.held_out - kNearly * (machine_.held_out - *first);
+    std::ptrdiff_t best = first - promise.begin();
+    const auto numbers = [&](std::ptrdiff_t i) {
+      return candidates_[candidates[static_cast<std::size_t>(i)]].numbers.size();
+    };
+    for (std::ptrdiff_t i = std::ssize(candidates); i-- > 0;)
+      if (promise[static_cast<std::size_t>(i)] <= enough && numbers(i) <= numbers(best)) best = i;
+    return best;
+  }
+
   /// One after the other, the one first that promises most.
   void fit_best_of(std::vector<std::size_t> left, const std::string& place, double least_share,
                    const std::function<bool()>& go_on) {
@@ -233,8 +250,7 @@ class Commissioner {
         promise[i] =
             promised(evidence_, machine_, with_candidates(candidates_, machine_, {left[i]}));
       });
-      const auto best =
-          left.begin() + (std::min_element(promise.begin(), promise.end()) - promise.begin());
+      const auto best = left.begin() + simplest_of_best(left, promise);
       FittedMachine better = with_candidates(candidates_, machine_, {*best});
       converge(evidence_, better);
       if (!gains_enough(machine_, better, least_share)) return;
@@ -256,10 +272,22 @@ class Commissioner {
       result_.numbers.push_back({n.number.key, n.value, std::max(n.number.min, n.value - half),
                                  std::min(n.number.max, n.value + half)});
     }
-    result_.machine = machine_.machine;
+    // What controllers know stays what is declared.
+    result_.machine = as_hypothesis(of_.declared, machine_.machine);
     result_.figures =
         figures_of(of_.record, of_.replica, of_.declared, result_.machine, "all laps");
+    tell_form();
     result_.warnings = evidence_.noise().warnings;
+  }
+
+  /// What is left besides noise goes into the model: of what can be compared with that.
+  void tell_form() {
+    Machine& m = result_.machine;
+    m.commissioned.clear();
+    for (const SignalFigure& f : figures_of(of_.record, of_.replica, m, m, ""))
+      if (f.after > f.floor)
+        m.commissioned.push_back(
+            {channel_name(f.channel), std::sqrt(f.after * f.after - f.floor * f.floor)});
   }
 
   const DiagnosisCase& of_;

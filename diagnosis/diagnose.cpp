@@ -5,11 +5,14 @@
 #include <optional>
 
 #include "diagnosis/findings.hpp"
+#include "diagnosis/records/signal_name.hpp"
+#include "diagnosis/replica/model_comparison.hpp"
 #include "diagnosis/search/chatter_search.hpp"
 #include "diagnosis/search/common_numbers.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/period_slip_search.hpp"
 #include "diagnosis/search/simplest_form.hpp"
+#include "model/input_error.hpp"
 
 namespace vcnc {
 namespace {
@@ -46,6 +49,39 @@ std::vector<double> forms_of(const Evidence& evidence, const DifferentialRecord&
   return forms;
 }
 
+/// RMS of what the declared machine left of each channel of a healthy run that it was fitted to
+/// [SI]; nought where nothing is known of a channel, empty where it was not fitted. Throws
+/// InputError naming a signal that there is not.
+std::vector<double> left_by_commissioning(const Machine& declared,
+                                          const std::vector<ComparedChannel>& channels) {
+  if (declared.commissioned.empty()) return {};
+  std::vector<double> left(channels.size(), 0.0);
+  for (const CommissionedSignal& s : declared.commissioned) {
+    bool known = false;
+    for (const SignalKind kind :
+         {SignalKind::position, SignalKind::twist, SignalKind::force, SignalKind::deflection})
+      for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+        known = known || s.signal == signal_name(kind, axis);
+    if (!known)
+      throw InputError("commissioned.signal: \"" + s.signal +
+                       "\" is none; allowed: position, twist or force of X, Y, Z, A or C, "
+                       "deflection of x, y or z");
+    for (std::size_t c = 0; c < channels.size(); ++c)
+      if (channel_name(channels[c]) == s.signal) left[c] = s.left;
+  }
+  return left;
+}
+
+/// All that the model leaves of a healthy run is its form: it counts as noise, and as much again
+/// may be there in another run, or be gained by what is not there.
+void allow_for_form(const Evidence& evidence, const std::vector<double>& left,
+                    DiagnosisOptions& options) {
+  for (std::size_t c = 0; c < left.size(); ++c) {
+    const double form = std::pow(left[c] / evidence.noise().channels[c].rms, 2);
+    options.form_of_channel.push_back(evidence.count(c, Role::held_out) * form / (1 + form));
+  }
+}
+
 /// The record of the case is what is explained: what was measured, or `difference`.
 Diagnosis explained(const DiagnosisCase& of, const Record& raw,
                     const DifferentialRecord* difference, DiagnosisOptions options,
@@ -56,7 +92,10 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
     before.slip = find_period_slip(raw, of.replica.channels(), of.replica.predict(declared),
                                    declared.probe.signal_period);
   if (before.slip) declared.effects.get<PeriodSlip>() = *before.slip;
-  Evidence evidence(of.record, of.replica, declared, difference ? difference->noise_scale : 1);
+  const std::vector<double> left =
+      difference ? std::vector<double>{} : left_by_commissioning(declared, of.replica.channels());
+  Evidence evidence(of.record, of.replica, declared, difference ? difference->noise_scale : 1,
+                    left);
   before.chatter = find_chatter(evidence, declared, of.candidates,
                                 difference ? difference->noise : HealthyNoise{});
   for (const Chatter& c : before.chatter) {
@@ -72,6 +111,8 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
     options.form_of_channel = forms_of(evidence, *difference);
     options.form_um = 1e6 * kChangeOfForm *
                       std::hypot(difference->off[0], difference->off[1], difference->off[2]);
+  } else if (!left.empty()) {
+    allow_for_form(evidence, left, options);
   }
   options.least_gain =
       std::max(options.least_gain, kFormAllowance * evidence.count(Role::held_out));
@@ -81,8 +122,13 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
   SelectionResult selection =
       select_effects_of(evidence, declared, of.candidates, options, keep_going);
   bring_to_simplest_form(evidence, declared, options, selection.floor, selection.found);
-  return findings_of(of, evidence, options, std::move(selection), std::move(before),
-                     difference != nullptr);
+  Diagnosis d = findings_of(of, evidence, options, std::move(selection), std::move(before),
+                            difference != nullptr);
+  if (!left.empty())
+    d.notes.push_back(
+        "As much as the model left of the healthy run that it was fitted to counts for its form "
+        "and needs no cause.");
+  return d;
 }
 
 }  // namespace

@@ -148,7 +148,7 @@ class Report {
     for (const AddedEffect& a : found().added) {
       const Candidate& candidate = of_.candidates[a.candidate];
       if (!(a.gain > options_.least_gain)) {
-        withhold(candidate);
+        withhold(candidate, "was tried and is not needed");
         continue;
       }
       FoundEffect e;
@@ -160,6 +160,10 @@ class Report {
         if (n.whole) e.numbers.push_back({n.key, value, value, value});
       }
       e.gain = a.gain;
+      if (may_be_as_declared(a, e.numbers)) {
+        withhold(candidate, "fits, but may be as declared");
+        continue;
+      }
       Machine without = found().machine;
       for (const FreeNumber& n : candidate.numbers)
         move_number(without, n.key, number_of(of_.declared, n.key));
@@ -204,9 +208,21 @@ class Report {
     if (e.separating_program.empty()) e.separating_program = program_for(e.name);
   }
 
-  /// An effect that the finished fit can do without, since the declared numbers do as well.
-  void withhold(const Candidate& candidate) {
-    d_.notes.push_back(fmt::format("{} was tried and is not needed.", candidate.name()));
+  /// Whether the intervals of all its sizes hold what is declared of them.
+  bool may_be_as_declared(const AddedEffect& a, const std::vector<FittedNumber>& fitted) const {
+    bool holds = true;
+    for (std::size_t i = 0; i < a.numbers.size(); ++i) {
+      const FreedNumber& n = a.numbers[i];
+      if (n.shape || is_phase(n.number)) continue;
+      const double declared = number_of(of_.declared, n.number.key);
+      holds = holds && fitted[i].low <= declared && declared <= fitted[i].high;
+    }
+    return holds;
+  }
+
+  /// An effect that is not told; what is declared of it goes into the found machine.
+  void withhold(const Candidate& candidate, const std::string& why) {
+    d_.notes.push_back(fmt::format("{} {}.", candidate.name(), why));
     for (const FreeNumber& n : candidate.numbers)
       move_number(d_.found, n.key, number_of(selection_.base.machine, n.key));
   }
@@ -501,10 +517,14 @@ class Report {
   }
 
   void judge() {
+    // What is no part of the search was explained before it began.
+    const bool beforehand =
+        before_.slip || std::any_of(d_.effects.begin(), d_.effects.end(),
+                                    [](const auto& e) { return e.place == "setup"; });
     const double before =
-        excess(before_.slip ? evidence_.chi2(evidence_.residual(evidence_.predict(of_.declared)),
-                                             Role::held_out)
-                            : selection_.base.held_out);
+        excess(beforehand ? evidence_.chi2(evidence_.residual(evidence_.predict(of_.declared)),
+                                           Role::held_out)
+                          : selection_.base.held_out);
     const FittedMachine& kept = withdrawn_ ? selection_.base : found();
     const double after = excess(kept.held_out);
     const double ratio = 1 + after / std::max(1.0, floor_);

@@ -334,6 +334,20 @@ struct SetupParams {
   }
 };
 
+/// What a model that was fitted to a healthy run leaves of one of its signals, noise aside: the
+/// error of the model's form, which is nothing that needs a cause.
+struct CommissionedSignal {
+  std::string signal;  ///< "position X", "force X", "deflection x"
+  double left = 0;     ///< RMS [m, rad, N or N m]
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    visit("signal", p.signal, "position X, twist X, force X, deflection x, ...");
+    visit("left_si", p.left, Unit{"", 1}, Range{0, 1e6},
+          "RMS that the model leaves of it in a healthy run, noise aside, in m, rad, N or Nm");
+  }
+};
+
 // ---------------------------------------------------------------------------------- machine
 
 struct Machine {
@@ -347,6 +361,7 @@ struct Machine {
   NcParams nc;
   SetupParams setup;
   Effects effects;
+  std::vector<CommissionedSignal> commissioned;
 
   Machine();  ///< sensible limits and masses for every axis
 
@@ -368,6 +383,8 @@ struct Machine {
     visit.group("nc", p.nc, "NC unit");
     visit.group("setup", p.setup, "workpiece, offsets, evaluation");
     visit.group("effects", p.effects, "what a real machine does besides");
+    visit.list("commissioned", p.commissioned,
+               "what a fit to a healthy run left (vcnc commission)");
   }
 };
 

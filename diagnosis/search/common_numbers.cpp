@@ -43,7 +43,8 @@ std::vector<FreedNumber> common_numbers(const Machine& healthy) {
   Machine copy = healthy;
   std::vector<FreedNumber> all;
   for (const Parameter& p : parameters(copy)) {
-    const double value = p.in_unit(), tolerance = tolerance_of(p.key, value);
+    if (tolerance_of(p.key, 1) <= 0) continue;
+    const double value = number_of(healthy, p.key), tolerance = tolerance_of(p.key, value);
     if (tolerance <= 0) continue;
     all.push_back({.number = {.key = std::string(kCommon) + p.key,
                               .typical = tolerance,

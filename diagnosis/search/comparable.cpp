@@ -18,9 +18,11 @@ constexpr double kSettled = 0.5;  // [s]
 /// Readings are rough where their second differences in that reach are as large, of the usual.
 constexpr double kRough = 8;
 constexpr double kSlowSliding = 20e-3;  // [m/s]
-/// A ball that is deflected by less is free; readings so soon before and after it touches depend
-/// on where exactly the piece lies.
-constexpr double kFree = 1e-6, kTouching = 0.05;  // [m], [s]
+/// A ball that is deflected by less of the largest deflection is free, whatever its inertia does;
+/// readings so soon before and after it touches depend on where exactly the piece lies.
+constexpr double kFree = 0.003, kTouching = 0.05;  // [s]
+/// A ball that swings goes through zero within half a period of the slowest suspension.
+constexpr double kHalfSwing = 0.03;  // [s]
 /// A ball on a piece rests below this part of its usual speed; its drag has turned over after
 /// twice the friction times the deflection, for a friction of 0.2.
 constexpr double kResting = 0.04, kTurnOver = 0.4;
@@ -64,18 +66,41 @@ void mask_settled(const Record& record, const std::vector<ComparedChannel>& chan
   }
 }
 
+/// Of the ball at every sample [m].
+std::vector<double> deflections(const std::vector<ComparedChannel>& channels,
+                                const Prediction& declared, std::size_t samples) {
+  std::vector<double> all(samples, 0.0);
+  for (std::size_t c = 0; c < channels.size(); ++c)
+    for (std::size_t k = 0; channels[c].kind == SignalKind::deflection && k < samples; ++k)
+      if (std::isfinite(declared[c][k])) all[k] = std::hypot(all[k], declared[c][k]);
+  return all;
+}
+
 void mask_touching(const Record& record, const std::vector<ComparedChannel>& channels,
                    const Prediction& declared, Flags& valid) {
   const auto samples = [&](double time) {
     return static_cast<std::size_t>(std::round(time / record.period));
   };
   const std::size_t n = record.samples();
+  const std::vector<double> deflection = deflections(channels, declared, n);
+  const double least = kFree * *std::max_element(deflection.begin(), deflection.end());
+  const auto free = [&](std::size_t k) { return deflection[k] <= least; };
   std::vector<std::size_t> readings;
   for (std::size_t c = 0; c < valid.size(); ++c)
     if (channels[c].kind == SignalKind::deflection) readings.push_back(c);
-  const auto free = [&](std::size_t k) {
-    return std::all_of(readings.begin(), readings.end(),
-                       [&](std::size_t c) { return !(std::abs(declared[c][k]) > kFree); });
+  // Within half a period a ball that swings was on the other side.
+  const auto swings = [&](std::size_t k) {
+    for (std::size_t j = k > samples(kHalfSwing) ? k - samples(kHalfSwing) : 0; j < k; ++j) {
+      double along = 0;
+      for (const std::size_t c : readings) along += declared[c][j] * declared[c][k];
+      if (along < 0) return true;
+    }
+    return false;
+  };
+  // When it lost the piece before it came to rest.
+  const auto released = [&](std::size_t k) {
+    while (k > 0 && swings(k - 1)) --k;
+    return k;
   };
   const auto leave_out_about = [&](std::size_t k) {
     const std::size_t begin = k > samples(kTouching) ? k - samples(kTouching) : 0;
@@ -88,7 +113,10 @@ void mask_touching(const Record& record, const std::vector<ComparedChannel>& cha
     std::size_t end = begin;
     while (end < n && free(end)) ++end;
     if (end - begin > samples(kReach)) {  // shorter: a reading goes through zero
-      if (begin > 0) leave_out_about(begin);
+      if (begin > 0) {
+        leave_out_about(released(begin));
+        leave_out_about(begin);
+      }
       if (end < n) leave_out_about(end);
     }
     begin = end + 1;
@@ -118,20 +146,19 @@ std::vector<double> ways(const Record& record) {
 void mask_resting_ball(const Record& record, const std::vector<ComparedChannel>& channels,
                        const Prediction& declared, Flags& valid) {
   const std::vector<double> way = ways(record);
-  std::vector<double> deflection(way.size(), 0.0), usual;
-  for (std::size_t k = 0; k < way.size(); ++k) {
-    for (std::size_t c = 0; c < valid.size(); ++c)
-      if (channels[c].kind == SignalKind::deflection && std::isfinite(declared[c][k]))
-        deflection[k] = std::hypot(deflection[k], declared[c][k]);
-    if (deflection[k] > kFree && way[k] > 0) usual.push_back(way[k]);
-  }
+  if (way.empty()) return;
+  const std::vector<double> deflection = deflections(channels, declared, way.size());
+  const double least = kFree * *std::max_element(deflection.begin(), deflection.end());
+  std::vector<double> usual;
+  for (std::size_t k = 0; k < way.size(); ++k)
+    if (deflection[k] > least && way[k] > 0) usual.push_back(way[k]);
   if (usual.empty()) return;
   const auto middle = usual.begin() + static_cast<std::ptrdiff_t>(usual.size() / 2);
   std::nth_element(usual.begin(), middle, usual.end());
   double since = 0;
   for (std::size_t k = 0; k < way.size(); ++k) {
     since = way[k] < kResting * *middle ? 0 : since + way[k];
-    if (deflection[k] < kFree || since > kTurnOver * deflection[k]) continue;
+    if (deflection[k] <= least || since > kTurnOver * deflection[k]) continue;
     for (std::size_t c = 0; c < valid.size(); ++c)
       if (channels[c].kind == SignalKind::deflection) valid[c][k] = 0;
   }

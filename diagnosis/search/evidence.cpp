@@ -49,7 +49,7 @@ Column less(const Column& z, const std::vector<Column>& columns, const Eigen::Ve
 }
 
 Evidence::Evidence(const Record& record, Replica& replica, const Machine& declared,
-                   double noise_scale)
+                   double noise_scale, const std::vector<double>& form)
     : record_(record),
       replica_(replica),
       gathering_(replica),
@@ -82,7 +82,12 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
   mask(difference);
   mask(rounding);
   noise_ = audit_noise(record, partition_, replica.channels(), difference, rounding);
-  for (ChannelNoise& channel : noise_.channels) channel.filter.scale *= noise_scale;
+  for (std::size_t c = 0; c < noise_.channels.size(); ++c) {
+    ChannelNoise& channel = noise_.channels[c];
+    const double louder = c < form.size() ? std::hypot(1, form[c] / channel.rms) : 1;
+    channel.filter.scale *= noise_scale * louder;
+    channel.of_laps /= louder * louder;
+  }
   count_valid();
   if (!rounding.empty() && !per_shift.empty())
     whiten_shifts(per_shift, rms_shift(laps, per_shift, rounding));

@@ -59,9 +59,11 @@ enum class Role { fitted, held_out, both };
 class Evidence {
  public:
   /// `declared` says which samples can be compared at all, and gives the residual whose repetitions
-  /// tell the noise; `noise_scale` is what its standard deviation grows by beyond what laps tell.
-  /// The references must outlive this.
-  Evidence(const Record& record, Replica& replica, const Machine& declared, double noise_scale = 1);
+  /// tell the noise; `noise_scale` is what its standard deviation grows by beyond what laps tell,
+  /// `form` the RMS per channel that the model is known to leave [SI] and that counts as noise,
+  /// too. The references must outlive this.
+  Evidence(const Record& record, Replica& replica, const Machine& declared, double noise_scale = 1,
+           const std::vector<double>& form = {});
 
   const Record& record() const { return record_; }
   const Replica& replica() const { return replica_; }

@@ -47,10 +47,20 @@ double tolerance_of(const std::string& key, double value) {
 
 /// Of a machine or of a const one; null where there is none.
 template <class M>
-auto common_of(M& machine, const std::string& key) -> decltype(machine.effects.deviations.data()) {
+auto deviation_of(M& machine, const std::string& key)
+    -> decltype(machine.effects.deviations.data()) {
   for (auto& d : machine.effects.deviations)
     if (d.key == key) return &d;
   return nullptr;
+}
+
+/// Where a number is said to deviate, it is the deviation that is moved.
+void put(const Parameter& p, Deviation* deviation, double value) {
+  const double within = std::clamp(value, p.range.min, p.range.max);
+  if (deviation)
+    deviation->value = within;
+  else
+    *p.value = within * p.unit.to_si;
 }
 
 }  // namespace
@@ -62,10 +72,8 @@ bool never_quite_absent(const std::string& key) {
 }
 
 double number_of(const Machine& machine, const std::string& key) {
-  if (key.starts_with(kCommon)) {
-    const Deviation* d = common_of(machine, key);
-    return d ? d->value : 0;
-  }
+  if (const Deviation* d = deviation_of(machine, key)) return d->value;
+  if (key.starts_with(kCommon)) return 0;
   Machine copy = machine;
   for (const Parameter& p : parameters(copy))
     if (p.key == key) return p.in_unit();
@@ -75,16 +83,14 @@ double number_of(const Machine& machine, const std::string& key) {
 }
 
 void move_number(Machine& machine, const std::string& key, double value) {
+  Deviation* deviation = deviation_of(machine, key);
   if (key.starts_with(kCommon)) {
-    Deviation* d = common_of(machine, key);
-    if (!d) d = &machine.effects.deviations.emplace_back(Deviation{key, 0});
-    d->value = value;
+    if (!deviation) deviation = &machine.effects.deviations.emplace_back(Deviation{key, 0});
+    deviation->value = value;
     return;
   }
   for (const Parameter& p : parameters(machine)) {
-    if (p.key != key) continue;
-    *p.value = std::clamp(value, p.range.min, p.range.max) * p.unit.to_si;
-    return;
+    if (p.key == key) return put(p, deviation, value);
   }
   for (const WholeParameter& p : whole_parameters(machine)) {
     if (p.key != key) continue;
@@ -104,7 +110,7 @@ Machine with(Machine machine, const std::vector<FreedNumber>& numbers) {
                                 [&](const Parameter& q) { return q.key == n.number.key; });
     if (p == all.end())
       throw std::invalid_argument(n.number.key + ": is not a number of a machine file");
-    *p->value = std::clamp(n.value, p->range.min, p->range.max) * p->unit.to_si;
+    put(*p, deviation_of(machine, n.number.key), n.value);
   }
   return machine;
 }
@@ -121,7 +127,8 @@ void take_values(std::vector<FreedNumber>& numbers, const Machine& machine) {
     for (FreedNumber& n : numbers)
       if (n.number.key == p.key) n.value = p.in_unit();
   for (FreedNumber& n : numbers)
-    if (n.common()) n.value = number_of(machine, n.number.key);
+    if (n.common() || deviation_of(machine, n.number.key))
+      n.value = number_of(machine, n.number.key);
 }
 
 bool has_key(const std::vector<FreedNumber>& numbers, const std::string& key) {
@@ -145,7 +152,8 @@ std::vector<FreedNumber> nuisances(const Machine& declared) {
   Machine copy = declared;
   std::vector<FreedNumber> all;
   for (const Parameter& p : parameters(copy)) {
-    const double value = p.in_unit(), tolerance = tolerance_of(p.key, value);
+    const Deviation* d = deviation_of(declared, p.key);
+    const double value = d ? d->value : p.in_unit(), tolerance = tolerance_of(p.key, value);
     if (tolerance <= 0) continue;
     // Counted in what is small, so that differences are taken near the declaration.
     const bool clamped = p.key.starts_with("effects.setup.");

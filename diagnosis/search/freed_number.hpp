@@ -32,8 +32,8 @@ struct FreedNumber {
   }
 };
 
-/// In the unit of the key, common ones less what is declared. Throws std::invalid_argument for an
-/// unknown key.
+/// In the unit of the key, common ones less what is declared; of one that is said to deviate, its
+/// true value. Throws std::invalid_argument for an unknown key.
 double number_of(const Machine& machine, const std::string& key);
 /// Like set_parameter(), but what is out of range becomes the nearest that is allowed.
 void move_number(Machine& machine, const std::string& key, double value);

@@ -175,6 +175,20 @@ TEST(Config, AVectorDeviatesAsAWhole) {
   EXPECT_EQ(m.effects.deviations.size(), 3u);
 }
 
+TEST(Config, WhatCommissioningLeftIsKept) {
+  const std::string text =
+      "name = \"m\"\n[[commissioned]]\nsignal = \"force X\"\nleft_si = 7.5\n"
+      "[[commissioned]]\nsignal = \"deflection x\"\nleft_si = 2e-7\n";
+  const Machine m = parse_machine(to_toml(parse_machine(text, "m")), "again");
+  ASSERT_EQ(m.commissioned.size(), 2u);
+  EXPECT_EQ(m.commissioned[1].signal, "deflection x");
+  EXPECT_EQ(m.commissioned[1].left, 2e-7);
+  EXPECT_EQ(to_toml(Machine()).find("commissioned"), std::string::npos);
+  EXPECT_EQ(
+      error_of([] { parse_machine("name = \"m\"\n[[commissioned]]\nleft_si = -1\n", "m.toml"); }),
+      "m.toml:3: commissioned.left_si: -1 is out of range, allowed 0 .. 1000000");
+}
+
 TEST(Config, MessagesNameFileAndLine) {
   EXPECT_EQ(error_of([] { parse_machine("name = \"a\"\n[axes.X]\nkv = 3\n", "m.toml"); }),
             "m.toml:3: axes.X.kv: unknown key; did you mean kv_per_s?");

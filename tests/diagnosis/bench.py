@@ -7,7 +7,8 @@
 Part `own`: recordings of the virtual machine itself (vcnc run --inject), against the declared model.
 Part `independent`: tables of the generator in generator/, which shares no code, friction law, integrator,
 loop rates, kinematics or noise with vcnc; differential, the piece clamped anew and the machine at another
-thermal state between the healthy run and the test.
+thermal state between the healthy run and the test. Part `independent_absolute`: the same without the healthy run,
+against the declared model as `vcnc commission` has fitted it to that.
 
 Answer keys are written and their SHA-256 printed before anything is diagnosed. Every run counts. With --bounds
 the measured shares must not fall behind those of bounds.toml; exit code 1 if one does.
@@ -277,8 +278,21 @@ def write_inputs(work):
     (work / "program.ngc").write_text(program.program()[0])
 
 
+def commissioned(work, reference):
+    """The declared model as fitted to a healthy run."""
+    return (work / reference).with_suffix(".toml")
+
+
+def commission(vcnc, work, reference):
+    out = commissioned(work, reference)
+    if not out.exists():
+        run([vcnc, "commission", str(work / reference), "--map", str(work / "map.toml"), "--model", str(work / "machine.toml"),
+             "--out", str(out)])
+
+
 def independent_run(vcnc, work, s, absolute):
-    arguments = [str(work / f"test_{s['number']}.csv"), "--map", str(work / "map.toml"), "--model", str(work / "machine.toml")]
+    model = commissioned(work, s["reference"]) if absolute else work / "machine.toml"
+    arguments = [str(work / f"test_{s['number']}.csv"), "--map", str(work / "map.toml"), "--model", str(model)]
     if not absolute:
         arguments += ["--reference", str(work / s["reference"])]
     if "without" in s:
@@ -296,6 +310,9 @@ def independent_part(vcnc, work, seed, counts, jobs, individuals, absolute=False
     for s in drawn:
         if s["kind"] == "without":
             leave_out(s, entries)
+    if absolute:
+        with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+            list(pool.map(lambda reference: commission(vcnc, work, reference), sorted({s["reference"] for s in drawn})))
     return pooled(jobs, lambda s: independent_run(vcnc, work, s, absolute), sorted(drawn, key=lambda s: s["number"]))
 
 
@@ -376,7 +393,7 @@ are written, and their SHA-256 printed, before anything is diagnosed; every run 
   Euler at 16 kHz, screw exponentials, quasi-static contact, own noise (20 nm, 10 N, 0.15 um). Differential: a healthy run and a
   test of one individual, whose masses and friction are off by their tolerances (mass 1 %, friction 3 to 10 %); between the two the
   piece is clamped anew (5 um, 20 urad) and the thermal state changes (friction 1 to 3 %, scales 1 ppm, drift 0.1 um/min).
-* **independent_absolute**: the same tests against the declared model alone.
+* **independent_absolute**: the same tests without the healthy run, against the declared model as `vcnc commission` has fitted it to that.
 * **own**: the virtual machine itself as the generator (`vcnc run --inject`), against the declared model: an easy setting, since
   friction law and controller are the diagnosis' own.
 * *left out*, in either part: the effect is injected and taken out of the library (`vcnc diagnose --without`).

@@ -31,6 +31,11 @@ TEST(Commission, RecoversFrictionAndGainOfTheVirtualMachine) {
   EXPECT_NEAR(number_of(c.machine, "effects.X.viscous.coefficient_Ns_per_m"), 1500, 0.02 * 1500);
   EXPECT_NEAR(number_of(c.machine, "effects.X.kv_error.deviation_percent"), -6, 0.1);
   ASSERT_FALSE(c.figures.empty());
+  ASSERT_FALSE(c.machine.commissioned.empty());
+  for (const CommissionedSignal& s : c.machine.commissioned) {
+    EXPECT_GT(s.left, 0) << s.signal;
+    EXPECT_TRUE(s.signal != "position X" || s.left < 1e-6) << s.left;
+  }
   for (const SignalFigure& f : c.figures)
     if (f.channel.kind == SignalKind::position && f.channel.axis == kX) {
       EXPECT_LT(f.after, 0.01 * f.before);
@@ -47,6 +52,10 @@ TEST(Commission, RecoversALagOfTheVirtualMachine) {
   EXPECT_NEAR(number_of(c.machine, "effects.X.coulomb.level_N"), 180, 0.02 * 180);
   EXPECT_NEAR(number_of(c.machine, "axes.X.velocity_lag_us"), 250, 10);
   EXPECT_NEAR(number_of(c.machine, "axes.X.position_lag_us"), 0, 10);
+  // Its controller knows nothing of that.
+  EXPECT_EQ(c.machine.axes[kX].servo.velocity_lag, 0);
+  EXPECT_TRUE(std::any_of(c.machine.effects.deviations.begin(), c.machine.effects.deviations.end(),
+                          [](const Deviation& d) { return d.key == "axes.X.velocity_lag_us"; }));
 }
 
 /// Declared with another damping of the probe, without friction of the ball and without squareness.

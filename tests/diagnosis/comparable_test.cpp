@@ -87,6 +87,21 @@ TEST(Comparable, ReadingsOfASlowScan) {
   EXPECT_EQ(left_out(flags[2]), 80U);  // until 40 um are done
 }
 
+TEST(Comparable, NotReadingsAboutTheMomentOfReleaseHoweverLongTheBallSwings) {
+  RecordedRamp run(ramp(0.05));
+  for (std::size_t k = 1000; k < kSamples; ++k) {  // released at 1000, 25 Hz, still from 1290 on
+    const double t = 1e-3 * static_cast<double>(k - 1000);
+    run.measured[2][k] = run.predicted[2][k] =
+        100e-6 * std::exp(-t / 0.05) * std::cos(2 * 3.14159265 * 25 * t);
+  }
+  const auto flags = run.comparable();
+  EXPECT_TRUE(flags[2][930]);
+  EXPECT_FALSE(flags[2][970] || flags[2][1000] || flags[2][1030]);
+  EXPECT_TRUE(flags[2][1100]);
+  EXPECT_FALSE(flags[2][1270]);
+  EXPECT_TRUE(flags[2][1400]);
+}
+
 TEST(Comparable, NotReadingsAboutTheMomentOfTouching) {
   RecordedRamp run(ramp(0.05));
   for (std::size_t k = 0; k < 800; ++k) run.measured[2][k] = run.predicted[2][k] = 0;

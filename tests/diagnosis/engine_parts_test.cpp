@@ -471,5 +471,29 @@ TEST(Intervals, KnowThatLapsAreNotAlike) {
   EXPECT_NEAR(widths / numbers, 2.2 * 0.5 / std::sqrt(6), 0.15);
 }
 
+TEST(FreedNumber, OfWhatDeviatesIsTheTrueValue) {
+  Machine machine;
+  const std::string key = "axes.X.load_kg";
+  const double declared = machine.axes[kX].mechanics.load;
+  machine.effects.deviations = {{key, 480}};
+  EXPECT_EQ(number_of(machine, key), 480);
+  for (const FreedNumber& n : nuisances(machine)) {
+    if (n.number.key != key) continue;
+    EXPECT_EQ(n.centre, 480);
+    EXPECT_DOUBLE_EQ(n.tolerance, 4.8);
+  }
+  Machine moved = machine;
+  move_number(moved, key, 470);
+  EXPECT_EQ(number_of(moved, key), 470);
+  std::vector<FreedNumber> numbers{{.number = {.key = key}, .value = 460}};
+  moved = with(moved, numbers);
+  EXPECT_EQ(number_of(moved, key), 460);
+  numbers[0].value = 0;
+  take_values(numbers, moved);
+  EXPECT_EQ(numbers[0].value, 460);
+  EXPECT_EQ(moved.axes[kX].mechanics.load, declared);  // what the controller knows
+  ASSERT_EQ(moved.effects.deviations.size(), 1U);
+}
+
 }  // namespace
 }  // namespace vcnc
