@@ -210,14 +210,15 @@ class Report {
 
   /// Whether the intervals of all its sizes hold what is declared of them.
   bool may_be_as_declared(const AddedEffect& a, const std::vector<FittedNumber>& fitted) const {
-    bool holds = true;
+    bool some = false, holds = true;  // a limit that was tried is none of them
     for (std::size_t i = 0; i < a.numbers.size(); ++i) {
       const FreedNumber& n = a.numbers[i];
       if (n.shape || is_phase(n.number)) continue;
       const double declared = number_of(of_.declared, n.number.key);
+      some = true;
       holds = holds && fitted[i].low <= declared && declared <= fitted[i].high;
     }
-    return holds;
+    return some && holds;
   }
 
   /// An effect that is not told; what is declared of it goes into the found machine.

@@ -426,6 +426,38 @@ TEST(Diagnose, WhatMayBeAsDeclaredIsNotTold) {
       EXPECT_NE(e.name, "load_play") << seed;
 }
 
+/// The toy machine with readings that do not go beyond a limit.
+class ClippedReplica : public toy::ToyReplica {
+ public:
+  using toy::ToyReplica::ToyReplica;
+  Prediction predict(const Machine& m) const override {
+    Prediction all = toy::ToyReplica::predict(m);
+    const RangeClip& clip = m.effects.get<RangeClip>();
+    std::vector<double> reading = all[2];
+    if (!clip.null())
+      for (double& d : reading) d = std::clamp(d, -clip.limit, clip.limit);
+    all[2] = reading;
+    return all;
+  }
+};
+
+TEST(Diagnose, TellsALimitThoughItIsTriedAndNotFitted) {
+  // A reading of 6 um to both sides is cut at 4.5 um.
+  const Machine declared = toy::machine({{"effects.geometry.squareness.xy_urad", 200}});
+  Record record = measured(declared, 48);
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::deflection)
+      for (double& d : s.value) d = std::clamp(d, -4.5e-6, 4.5e-6);
+  std::vector<Candidate> all = toy::candidates();
+  for (const Candidate& c : candidates(Machine()))
+    if (c.effect == RangeClip::text.name) all.push_back(c);
+  ClippedReplica replica(record);
+  const Diagnosis d = diagnose({record, replica, declared, all});
+  ASSERT_EQ(d.effects.size(), 1U);
+  EXPECT_EQ(d.effects[0].name, "range_clip");
+  EXPECT_NEAR(number_of(d.found, "effects.probe.range_clip.limit_mm"), 4.5e-3, 0.1e-3);
+}
+
 TEST(LessHealthy, RefusesForcesThatOneRunKnowsAlone) {
   Record healthy = measured({}, 43), now = measured({}, 44);
   toy::ToyReplica of_healthy(healthy);
