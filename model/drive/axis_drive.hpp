@@ -6,11 +6,13 @@
 //
 // Every 100 us (loop step, T), at its instant t:
 //   v_ref = Kv e + kvff v_c,   e: x_c - x_m behind a first-order lag tau_x
-//   F_ref = Kp (v_ref - v) + (Kp/Ti) int (v_ref - v) dt + kaff J a_c + F_a,   v: v_m behind a lag
-//   tau_v |F_ref| <= F_max; the integral is held while the force is limited Kp    = 2 pi f_v J,  J
-//   = load + reflected motor inertia a_c   = (v_c(t + T) - v_c(t)) / T, the acceleration that the
-//   coming step needs on average F_a   what somebody adds to the demand, a straight line over the
-//   bus cycle x_m by the measuring system chosen (motor or load); v_m always of the motor side
+//   F_ref = Kp (v_ref - v) + (Kp/Ti) int (v_ref - v) dt + kaff J a_c + F_a
+//   |F_ref| <= F_max; the integral is held while the force is limited
+//   v:    v_m behind a lag tau_v
+//   Kp    = 2 pi f_v J,  J = load + reflected motor inertia
+//   a_c   = (v_c(t + T) - v_c(t)) / T, the acceleration that the coming step needs on average
+//   F_a:  what somebody adds to the demand, a straight line over the bus cycle
+//   x_m by the measuring system chosen (motor or load); v_m always of the motor side
 //
 // Velocity v_m: an observer with position, velocity and disturbance (three equal poles at 4 x the
 // velocity loop's crossover) is driven by the measured motor position and the drive force. In
@@ -33,10 +35,10 @@
 // 0.3 um on 500 kg). Friction implicitly (model/drive/friction.hpp).
 //
 // Where the effects of model/effects/ act: set-points as received and as used, gains, force of the
-// motor, spring (K, b), further force on the load (besides one that is known: a straight line over
-// the bus cycle), friction F_f, the position a measuring system
-// counts, and what the tool centre is off the scale (true position = load + displacement). The
-// controller knows the declared masses; the plant has the actual ones.
+// motor, spring (K, b), further force on the load, friction F_f, the position a measuring system
+// counts, and what the tool centre is off the scale (true position = load + displacement). Force on
+// the load that is known, a straight line over the bus cycle, comes besides. The controller knows
+// the declared masses; the plant has the actual ones.
 //
 // Several variants of an axis can be stepped side by side (AxisDriveLanes); each comes to the same
 // bits as alone.
