@@ -39,7 +39,9 @@ std::string with_interval(const FittedNumber& n) {
 std::string verdict_sentence(const Diagnosis& d) {
   switch (d.verdict) {
     case DiagnosisVerdict::explained:
-      return "what was added leaves nothing but noise";
+      return !d.differential && !d.declared.commissioned.empty()
+                 ? "what was added leaves no more than noise and what commissioning left"
+                 : "what was added leaves nothing but noise";
     case DiagnosisVerdict::partly:
       return fmt::format(
           "what was added explains {:.0f} % of what was to be explained{}", d.explained_share * 100,

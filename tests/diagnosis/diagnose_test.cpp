@@ -9,6 +9,7 @@
 
 #include "diagnosis/commission.hpp"
 #include "diagnosis/records/measured_table.hpp"
+#include "diagnosis/report/diagnosis_text.hpp"
 #include "diagnosis/search/period_slip_search.hpp"
 #include "toy_machine.hpp"
 
@@ -401,6 +402,7 @@ TEST(Diagnose, WhatCommissioningLeftNeedsNoCause) {
   EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
   ASSERT_EQ(d.effects.size(), 1U);
   EXPECT_EQ(d.effects[0].name, "load_play");
+  EXPECT_NE(verdict_sentence(d).find("what commissioning left"), std::string::npos);
   EXPECT_NEAR(d.effects[0].numbers[0].value, 3, 0.2);
   EXPECT_LT(d.effects[0].numbers[0].low, 3);
   EXPECT_GT(d.effects[0].numbers[0].high, 3);
