@@ -1,6 +1,7 @@
 #include "diagnosis/replica/axis_replay.hpp"
 
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 #include "diagnosis/records/record.hpp"
@@ -231,13 +232,16 @@ std::vector<AxisReplay> replay_variants(const std::vector<AxisVariant>& variants
     left.push_back(i);
     drives.emplace_back(variants[i].hypothesis, axis, kSeed);
   }
+  // Few of them are shared by all threads.
+  const std::size_t threads = std::max(1U, std::thread::hardware_concurrency()),
+                    most = std::clamp((left.size() + threads - 1) / threads, kWorthLanes, kLanes);
   std::vector<std::vector<std::size_t>> groups;
   while (!left.empty()) {
     std::vector<std::size_t>& group = groups.emplace_back();
     std::vector<std::size_t> rest;
     for (const std::size_t i : left) {
       const bool alone = group.empty();
-      const bool joins = alone || (group.size() < kLanes && drives[i].suits(drives[group.front()]));
+      const bool joins = alone || (group.size() < most && drives[i].suits(drives[group.front()]));
       (joins ? group : rest).push_back(i);
     }
     left = std::move(rest);

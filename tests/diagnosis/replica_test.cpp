@@ -121,14 +121,14 @@ TEST(MachineReplica, KnownForcesAct) {
   Record record = run.record;
   std::vector<double> force(record.samples(), 0.0);
   for (std::size_t n = 0; n < 5; ++n) {
-    const auto at = static_cast<double>(1000 + 700 * n);
+    const auto at = static_cast<double>(200 + 350 * n);
     for (const auto& [ms, newtons] :
          {std::pair{at, 0.0}, {at + 10, 80.0}, {at + 60, 80.0}, {at + 70, 0.0}}) {
       law.at.push_back(ms * 1e-3);
       law.value.push_back(newtons);
     }
     for (std::size_t k = 0; k <= 70; ++k)
-      force[1000 + 700 * n + k] =
+      force.at(200 + 350 * n + k) =
           std::min({80.0, 8.0 * static_cast<double>(k), 8.0 * static_cast<double>(70 - k)});
   }
   Machine pushed = run.true_machine;
