@@ -352,34 +352,6 @@ TEST(Diagnose, ReferenceRunCancelsWhatTheModelGetsWrong) {
   EXPECT_EQ(none.verdict, DiagnosisVerdict::no_deviation);
 }
 
-TEST(Diagnose, BetweenTwoRunsTellsNothingThatExplainsLessThanATenthOfWhatIsLeft) {
-  // A wave that is a law of nothing, and a squareness of a twentieth of its chi-square.
-  const auto seen_with = [](double wave_um, std::uint64_t seed) {
-    const Machine truth = toy::machine({{"effects.geometry.squareness.xy_urad", 9}});
-    Record record = measured(truth, seed);
-    for (MeasuredSignal& s : record.signals)
-      if (s.kind == SignalKind::deflection)
-        for (std::size_t k = 0; k < s.value.size(); ++k)
-          s.value[k] +=
-              1e-6 * wave_um * std::sin(2 * kPi * 27 * static_cast<double>(k % 1000) / 1000);
-    return record;
-  };
-  const Record healthy = measured({}, 51);
-  toy::ToyReplica of_healthy(healthy);
-  const auto names_squareness = [](const Diagnosis& d) {
-    return std::any_of(d.effects.begin(), d.effects.end(),
-                       [](const FoundEffect& e) { return e.name == "squareness"; });
-  };
-  for (const double wave_um : {0.2, 1.0}) {
-    const Record sick = seen_with(wave_um, 52);
-    toy::ToyReplica of_sick(sick);
-    const Diagnosis d = diagnose({sick, of_sick, {}, toy::candidates()},
-                                 less_healthy(sick, healthy, of_healthy, {}));
-    EXPECT_EQ(names_squareness(d), wave_um == 0.2);
-    EXPECT_TRUE(names_squareness(diagnosed(sick))) << wave_um;  // against the declared machine
-  }
-}
-
 /// A reading that the model gets wrong by a wave over the lap that no effect makes.
 Record with_wave(Record record, double wave_um) {
   for (MeasuredSignal& s : record.signals)
@@ -388,6 +360,25 @@ Record with_wave(Record record, double wave_um) {
         s.value[k] +=
             1e-6 * wave_um * std::sin(2 * kPi * 27 * static_cast<double>(k % 1000) / 1000);
   return record;
+}
+
+TEST(Diagnose, BetweenTwoRunsTellsNothingThatExplainsLessThanATenthOfWhatIsLeft) {
+  // A wave that is a law of nothing, and a squareness of a twentieth of its chi-square.
+  const Machine truth = toy::machine({{"effects.geometry.squareness.xy_urad", 9}});
+  const Record healthy = measured({}, 51);
+  toy::ToyReplica of_healthy(healthy);
+  const auto names_squareness = [](const Diagnosis& d) {
+    return std::any_of(d.effects.begin(), d.effects.end(),
+                       [](const FoundEffect& e) { return e.name == "squareness"; });
+  };
+  for (const double wave_um : {0.2, 1.0}) {
+    const Record sick = with_wave(measured(truth, 52), wave_um);
+    toy::ToyReplica of_sick(sick);
+    const Diagnosis d = diagnose({sick, of_sick, {}, toy::candidates()},
+                                 less_healthy(sick, healthy, of_healthy, {}));
+    EXPECT_EQ(names_squareness(d), wave_um == 0.2);
+    EXPECT_TRUE(names_squareness(diagnosed(sick))) << wave_um;  // against the declared machine
+  }
 }
 
 TEST(Diagnose, WhatCommissioningLeftNeedsNoCause) {
