@@ -4,6 +4,7 @@
 
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "analysis/whole_file.hpp"
 #include "apps/node_options.hpp"
@@ -44,32 +45,34 @@ void append_figures(std::vector<SignalFigure>& figures, const Record& record,
   figures.insert(figures.end(), more.begin(), more.end());
 }
 
-void predict_tests(const DiagnoseOptions& options, const Machine& declared, const Machine& found,
+/// Those of the healthy run's program less that, as the run itself.
+void predict_tests(const DiagnoseOptions& options, const std::optional<HealthyRun>& healthy,
+                   const Machine& declared, const Machine& found,
                    std::vector<SignalFigure>& figures) {
   for (const std::string& test : options.tests) {
     if (stop_requested()) return;
-    append_figures(figures, load_record(test, options.map), declared, found, test);
+    Record record = load_record(test, options.map);
+    if (healthy && same_program(record, healthy->record))
+      record = less_healthy(record, *healthy).record;
+    append_figures(figures, record, declared, found, test);
   }
 }
 
-DifferentialRecord less_reference(const DiagnoseOptions& options, const Record& record,
-                                  const Machine& declared) {
-  const Record reference = load_record(options.reference, options.map);
-  return less_healthy(record, reference, *replica_of(reference, declared), declared);
+/// Nothing without --reference.
+std::optional<HealthyRun> reference_run(const DiagnoseOptions& options, const Machine& declared) {
+  if (options.reference.empty()) return std::nullopt;
+  const Record record = load_record(options.reference, options.map);
+  return healthy_run(record, *replica_of(record, declared), declared);
 }
 
 int compare_models(const DiagnoseOptions& options, const Record& record, const Machine& declared) {
   const Machine found = load_machine(options.compare);
   std::vector<SignalFigure> figures;
-  Machine before = declared;
-  if (options.reference.empty()) {
-    append_figures(figures, record, before, found, "run");
-  } else {
-    const DifferentialRecord difference = less_reference(options, record, declared);
-    before = difference.healthy;
-    append_figures(figures, difference.record, before, found, "run");
-  }
-  predict_tests(options, before, found, figures);
+  const std::optional<HealthyRun> healthy = reference_run(options, declared);
+  const Machine& before = healthy ? healthy->machine : declared;
+  append_figures(figures, healthy ? less_healthy(record, *healthy).record : record, before, found,
+                 "run");
+  predict_tests(options, healthy, before, found, figures);
   std::cout << figures_table(figures);
   return stop_requested() ? kExitInterrupted : kExitOk;
 }
@@ -94,17 +97,18 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
     return !stop_requested();
   };
   const DiagnosisCase of{record, replica, declared, candidates_without(declared, options.without)};
+  if (!options.reference.empty()) progress.show("fitting the reference run");
+  const std::optional<HealthyRun> healthy = reference_run(options, declared);
   Diagnosis d;
-  if (options.reference.empty()) {
-    d = diagnose(of, {}, keep_going);
-  } else {
-    progress.show("fitting the reference run");
-    const DifferentialRecord difference = less_reference(options, record, declared);
+  if (healthy) {
+    const DifferentialRecord difference = less_healthy(record, *healthy);
     seen = difference.record;
     d = diagnose(of, difference, {}, keep_going);
+  } else {
+    d = diagnose(of, {}, keep_going);
   }
   progress.show("predicting test runs");
-  predict_tests(options, d.declared, d.found, d.figures);
+  predict_tests(options, healthy, d.declared, d.found, d.figures);
   if (stop_requested()) d.warnings.push_back("stopped before the end; what was found so far");
   return d;
 }

@@ -439,9 +439,8 @@ class Report {
                            ? *selection_.law_alone
                            : best_law(evidence_, selection_.base, doubt_of(options_), options_);
       const double named = selection_.base.held_out - found().held_out;
-      const double clearly = needed + options_.share_of_found * named;
-      if (instead.gain > (found().added.size() > 1 ? named : named + clearly) &&
-          instead.gain > 0.5 * (named + std::max(0.0, law.gain))) {
+      if (instead.gain > 0.5 * (named + std::max(0.0, law.gain)) &&
+          takes_names_away(instead.gain, found().added.size(), named, needed)) {
         std::string names;
         for (const AddedEffect& a : found().added)
           names += (names.empty() ? "" : " with ") + of_.candidates[a.candidate].name();

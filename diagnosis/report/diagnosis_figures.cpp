@@ -20,7 +20,7 @@ constexpr int kBins = 30;
 /// Lower edge of a plot 300 high: with less room gnuplot leaves out what its axis is.
 constexpr double kUnder = 0.21;
 /// In the unit shown: less is nothing, and its numbers would have no room.
-constexpr double kNothingToSee = 1e-6;
+constexpr double kNothingToSee = 1e-3;
 
 Envelope envelope_of(const std::vector<double>& value, double begin, double period) {
   Envelope e(begin, begin + static_cast<double>(value.size()) * period, 1200);

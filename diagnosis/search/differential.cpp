@@ -80,22 +80,14 @@ Record without_outliers(Record record, const Replica& replica, const Machine& de
   return record;
 }
 
-/// The declared machine with the piece where it was clamped for a run; its noise, and what was not
-/// the same in all laps.
-struct Clamped {
-  Machine machine;
-  HealthyNoise noise;
-  std::vector<LapEvent> events;
-};
-
-Clamped as_clamped(const Record& run, Replica& replica, const Machine& declared) {
-  const Record record = without_outliers(run, replica, declared);
-  Evidence evidence(record, replica, declared);
-  std::vector<FreedNumber> clamping = nuisances(declared);
-  std::erase_if(clamping,
-                [](const FreedNumber& n) { return !n.number.key.starts_with("effects.setup."); });
-  return {fit_numbers(evidence, declared, std::move(clamping)).machine, healthy_noise(evidence),
-          evidence.events()};
+/// Laps of a healthy run that do the same as a lap of another.
+std::vector<const Stretch*> partners(const Stretch& lap, const Record& healthy) {
+  std::vector<const Stretch*> laps;
+  for (const Stretch& h : healthy.stretches) {
+    const std::size_t a = h.end - h.begin, b = lap.end - lap.begin;
+    if (h.condition == lap.condition && (a > b ? a - b : b - a) <= kSlack) laps.push_back(&h);
+  }
+  return laps;
 }
 
 /// Whether a sample of a signal is left out for what laps did not share.
@@ -119,29 +111,41 @@ void check_known_forces(const Record& now, const Record& healthy) {
 
 }  // namespace
 
-DifferentialRecord less_healthy(const Record& now, const Record& healthy, Replica& of_healthy,
-                                const Machine& declared) {
-  check_known_forces(now, healthy);
-  const Clamped clamped = as_clamped(healthy, of_healthy, declared);
-  DifferentialRecord result{.record = now, .noise = clamped.noise, .healthy = clamped.machine};
-  const Prediction predicted = of_healthy.predict(result.healthy);
-  const std::vector<ComparedChannel>& channels = of_healthy.channels();
+HealthyRun healthy_run(const Record& record, Replica& replica, const Machine& declared) {
+  const Record told = without_outliers(record, replica, declared);
+  Evidence evidence(told, replica, declared);
+  std::vector<FreedNumber> clamping = nuisances(declared);
+  std::erase_if(clamping,
+                [](const FreedNumber& n) { return !n.number.key.starts_with("effects.setup."); });
+  const Machine machine = fit_numbers(evidence, declared, std::move(clamping)).machine;
+  return {record,
+          machine,
+          healthy_noise(evidence),
+          evidence.events(),
+          replica.channels(),
+          replica.predict(machine)};
+}
+
+bool same_program(const Record& now, const Record& healthy) {
+  return std::none_of(now.stretches.begin(), now.stretches.end(),
+                      [&](const Stretch& s) { return partners(s, healthy).empty(); });
+}
+
+DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
+  check_known_forces(now, healthy.record);
+  DifferentialRecord result{.record = now, .noise = healthy.noise, .healthy = healthy.machine};
   std::size_t fewest = 0, unmatched = 0;
   for (MeasuredSignal& signal : result.record.signals) {
     if (!is_compared(signal.kind)) continue;
-    const auto channel =
-        std::find(channels.begin(), channels.end(), ComparedChannel{signal.kind, signal.axis});
-    const MeasuredSignal* partner = healthy.find(signal.kind, signal.axis);
+    const auto channel = std::find(healthy.channels.begin(), healthy.channels.end(),
+                                   ComparedChannel{signal.kind, signal.axis});
+    const MeasuredSignal* partner = healthy.record.find(signal.kind, signal.axis);
     std::vector<double> left(signal.value.size(), kMissing);
-    if (channel != channels.end() && partner) {
+    if (channel != healthy.channels.end() && partner) {
       const std::vector<double>& yhat =
-          predicted[static_cast<std::size_t>(channel - channels.begin())];
+          healthy.predicted[static_cast<std::size_t>(channel - healthy.channels.begin())];
       for (const Stretch& s : now.stretches) {
-        std::vector<const Stretch*> laps;
-        for (const Stretch& h : healthy.stretches) {
-          const std::size_t a = h.end - h.begin, b = s.end - s.begin;
-          if (h.condition == s.condition && (a > b ? a - b : b - a) <= kSlack) laps.push_back(&h);
-        }
+        const std::vector<const Stretch*> laps = partners(s, healthy.record);
         unmatched += laps.empty();
         if (laps.empty()) continue;
         fewest = fewest == 0 ? laps.size() : std::min(fewest, laps.size());
@@ -149,7 +153,7 @@ DifferentialRecord less_healthy(const Record& now, const Record& healthy, Replic
           double sum = 0;
           for (const Stretch* h : laps) {
             const std::size_t at = std::min(h->begin + (k - s.begin), h->end - 1);
-            sum += unlike(clamped.events, signal, at) ? kMissing : partner->value[at] - yhat[at];
+            sum += unlike(healthy.events, signal, at) ? kMissing : partner->value[at] - yhat[at];
           }
           left[k] = signal.value[k] - sum / static_cast<double>(laps.size());
         }

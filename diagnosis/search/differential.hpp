@@ -15,6 +15,7 @@
 
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
+#include "diagnosis/search/lap_events.hpp"
 #include "diagnosis/search/unrest.hpp"
 #include "model/axes.hpp"
 #include "model/machine.hpp"
@@ -29,7 +30,21 @@ struct DifferentialRecord {
   Machine healthy;  ///< what the record is held against instead of the declared machine
 };
 
-DifferentialRecord less_healthy(const Record& now, const Record& healthy, Replica& of_healthy,
-                                const Machine& declared);
+/// A healthy run and the declared machine with the piece where it was clamped for that.
+struct HealthyRun {
+  Record record;
+  Machine machine;
+  HealthyNoise noise;
+  std::vector<LapEvent> events;  ///< what was not the same in all laps
+  std::vector<ComparedChannel> channels;
+  Prediction predicted;  ///< of `machine`
+};
+HealthyRun healthy_run(const Record& record, Replica& replica, const Machine& declared);
+
+/// Whether every motion of a run has a partner in the healthy one.
+bool same_program(const Record& now, const Record& healthy);
+
+/// Throws MeasurementError where the two know other forces of the test.
+DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy);
 
 }  // namespace vcnc

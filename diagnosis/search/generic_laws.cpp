@@ -18,6 +18,8 @@ constexpr std::size_t kHats = 10;
 constexpr std::size_t kSimulated = 3;  // of the best laws by their columns
 constexpr int kRounds = 4;
 constexpr double kNudge = 0.02, kWorthARound = 0.99;
+/// Part of what a true effect does that its model may be wrong by, see takes_names_away().
+constexpr double kWrongAboutOne = 0.05;
 constexpr double kPulse = 2e-3;  // half width of the pulse [s]
 
 using Series = std::vector<double>;
@@ -385,6 +387,10 @@ Eigen::VectorXd refine(const Evidence& evidence, const Machine& without, const L
 }
 
 }  // namespace
+
+bool takes_names_away(double alone, std::size_t names, double named, double needed) {
+  return alone > (names > 1 ? named : named + needed + kWrongAboutOne * named);
+}
 
 std::string words_of(const Law& law) {
   constexpr const char* points[] = {"command", "command time", "motor force",

@@ -34,6 +34,12 @@ struct LawFit {
 LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& doubt,
                 const DiagnosisOptions& options);
 
+/// Whether a law that gains `alone` takes the names away from as many effects that gain `named`.
+/// A law has ten numbers and bends to what the model of a true effect gets wrong about it, some
+/// percent of what that does: one name only goes where the law gains clearly more, besides what a
+/// law is to gain at all (`needed`). Of several names one law is the simpler account.
+bool takes_names_away(double alone, std::size_t names, double named, double needed);
+
 /// "force on X as sgn(v_X) f(q_X)"
 std::string words_of(const Law& law);
 

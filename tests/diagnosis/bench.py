@@ -58,17 +58,16 @@ def run(command):
     return used.ru_utime + used.ru_stime
 
 
-def diagnose(vcnc, answer, arguments, out):
-    """The grade of one diagnosis; with --work it is kept beside what was found and taken from there again."""
-    kept = out.with_suffix(".json")
-    if kept.exists():
-        return json.loads(kept.read_text())
-    row = diagnose_anew(vcnc, answer, arguments, out)
-    kept.write_text(json.dumps(row))
+def kept(path, make):
+    """A grade; with --work it is kept beside what was found and taken from there again."""
+    if path.exists():
+        return json.loads(path.read_text())
+    row = make()
+    path.write_text(json.dumps(row))
     return row
 
 
-def diagnose_anew(vcnc, answer, arguments, out):
+def diagnose(vcnc, answer, arguments, out):
     try:
         seconds = run([vcnc, "diagnose", *arguments, "--out", str(out)])
     except RuntimeError as error:
@@ -179,7 +178,7 @@ def text_of(value):
 
 
 def own_run(vcnc, work, s, per_shift):
-    """One machine: run, diagnosed, graded."""
+    """One machine: run, diagnosed, graded, and what was found held against another piece."""
     folder = work / f"own_{s['number']}"
     command = [vcnc, "run", str(work / "program.ngc"), "--machine", str(work / "own.toml"), "--in-process", "--no-report",
                "--seed", str(s["number"] + 1), "--out", str(folder)]
@@ -191,9 +190,7 @@ def own_run(vcnc, work, s, per_shift):
     extra = ["--without", s["without"]] if "without" in s else []
     row = diagnose(vcnc, s, [str(folder), "--model", str(work / "own.toml"), *extra], work / f"own_{s['number']}_found")
     shutil.rmtree(folder)
-    if s["kind"] == "single" and "failed" not in row:
-        transfer(vcnc, work, s, row, per_shift)
-    return row
+    return row | transfer(vcnc, work, s, row, per_shift)
 
 
 def own_part(vcnc, work, seed, counts, jobs):
@@ -208,7 +205,7 @@ def own_part(vcnc, work, seed, counts, jobs):
         number = s["number"]
         print(f"own answer_{number} {files.write_answer(work / f'own_answer_{number}.json', s)}", flush=True)
     per_shift = readings_per_shift(vcnc, work)
-    return pooled(jobs, lambda s: own_run(vcnc, work, s, per_shift), drawn)
+    return pooled(jobs, lambda s: kept(work / f"own_{s['number']}_found.json", lambda: own_run(vcnc, work, s, per_shift)), drawn)
 
 
 def contour_readings(vcnc, work, name, machine_file, assignments):
@@ -254,10 +251,13 @@ def left_where_clamped_best(difference, per_shift):
 
 
 def transfer(vcnc, work, s, row, per_shift):
-    """What the model found on circles and lines leaves of the S piece's error, as a share of what the declared model
-    leaves: both against the true machine, another piece being clamped."""
-    if row.get("strength", 0) < 3 or not row["top"] or s["effects"][0]["name"] in ("period_slip", "contact_loss"):
-        return
+    """What the declared model and the one found on circles and lines leave of the readings on the S piece [um], both
+    against the true machine; of strong single effects that were named, and of clean machines: those show what noise leaves."""
+    named = s["kind"] == "single" and row.get("strength", 0) >= 3 and row.get("top")
+    if "failed" in row or not (named or s["kind"] == "clean"):
+        return {}
+    if any(e["name"] in ("period_slip", "contact_loss") for e in s["effects"]):
+        return {}
     truth = {k: v for k, v in s["assignments"].items() if not k.startswith("effects.setup.")}
     name = f"transfer_{s['number']}"
     true = contour_readings(vcnc, work, name, work / "own.toml", truth | QUIET)
@@ -265,8 +265,8 @@ def transfer(vcnc, work, s, row, per_shift):
     for model in (work / "own.toml", work / f"own_{s['number']}_found" / MODEL):
         other = contour_readings(vcnc, work, name, model, clamped_at([0.0, 0.0, 0.0]) | QUIET)
         n = min(len(true), len(other))
-        left.append(left_where_clamped_best(true[:n] - other[:n], per_shift))
-    row["transfer"] = left[1] / left[0]
+        left.append(1e6 * left_where_clamped_best(true[:n] - other[:n], per_shift))
+    return {"transfer_um": left}
 
 
 # --- the independent generator ------------------------------------------------------------------------
@@ -297,7 +297,8 @@ def independent_run(vcnc, work, s, absolute):
         arguments += ["--reference", str(work / s["reference"])]
     if "without" in s:
         arguments += ["--without", s["without"]]
-    return diagnose(vcnc, s, arguments, work / f"{'absolute' if absolute else 'found'}_{s['number']}")
+    out = work / f"{'absolute' if absolute else 'found'}_{s['number']}"
+    return kept(out.with_suffix(".json"), lambda: diagnose(vcnc, s, arguments, out))
 
 
 def independent_part(vcnc, work, seed, counts, jobs, individuals, absolute=False, numbers=None):
@@ -361,7 +362,9 @@ def shuffled_part(vcnc, work, seed, jobs, count=6):
     def one(s):
         arguments = [str(shuffled(work, s, rng)), "--map", str(work / "map.toml"), "--model", str(work / "machine.toml"),
                      "--reference", str(work / s["reference"])]
-        return diagnose(vcnc, {"kind": "clean", "effects": [], "number": s["number"]}, arguments, work / f"shuffled_{s['number']}")
+        out = work / f"shuffled_{s['number']}"
+        return kept(out.with_suffix(".json"),
+                    lambda: diagnose(vcnc, {"kind": "clean", "effects": [], "number": s["number"]}, arguments, out))
     return pooled(jobs, one, drawn)
 
 

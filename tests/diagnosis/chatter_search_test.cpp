@@ -109,7 +109,8 @@ TEST(ChatterSearch, WhatVibratedBeforeIsNoNews) {
   const Record now = vibrating(kHertz, 10, 3), healthy = vibrating(kHertz, 10, 4);
   VibratingReplica replica(now), of_healthy(healthy);
   const Machine declared;
-  const DifferentialRecord difference = less_healthy(now, healthy, of_healthy, declared);
+  const DifferentialRecord difference =
+      less_healthy(now, healthy_run(healthy, of_healthy, declared));
   EXPECT_FALSE(difference.noise.lines.empty());
   const Diagnosis d = diagnose({now, replica, declared, drive_candidates()}, difference);
   EXPECT_TRUE(d.effects.empty());
@@ -144,7 +145,7 @@ template <class Trembling>
 Diagnosis diagnosed_against(const Record& now, const Record& healthy) {
   Trembling replica(now), of_healthy(healthy);
   return diagnose({now, replica, {}, drive_candidates()},
-                  less_healthy(now, healthy, of_healthy, {}));
+                  less_healthy(now, healthy_run(healthy, of_healthy, {})));
 }
 
 TEST(ChatterSearch, NamesWhatMakesLapsDifferAsMuchAsTheyDo) {

@@ -137,7 +137,7 @@ TEST(CommonNumbers, KeepAFaultFromBeingToldTwice) {
   LaggingReplica of_healthy(healthy), of_now(now);
   const Machine declared = machine(0.3, 0);
   const Diagnosis d = diagnose({now, of_now, declared, toy::candidates()},
-                               less_healthy(now, healthy, of_healthy, declared));
+                               less_healthy(now, healthy_run(healthy, of_healthy, declared)));
   EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
   ASSERT_EQ(d.effects.size(), 1U);
   EXPECT_EQ(d.effects[0].name, "squareness");

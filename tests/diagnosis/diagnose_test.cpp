@@ -342,13 +342,13 @@ TEST(Diagnose, ReferenceRunCancelsWhatTheModelGetsWrong) {
   toy::ToyReplica of_healthy(healthy), of_sick(sick), of_well(well);
   const Machine declared;
   const Diagnosis d = diagnose({sick, of_sick, declared, toy::candidates()},
-                               less_healthy(sick, healthy, of_healthy, declared));
+                               less_healthy(sick, healthy_run(healthy, of_healthy, declared)));
   EXPECT_TRUE(d.differential);
   EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
   ASSERT_EQ(d.effects.size(), 1U);
   EXPECT_EQ(d.effects[0].name, "squareness");
   const Diagnosis none = diagnose({well, of_well, declared, toy::candidates()},
-                                  less_healthy(well, healthy, of_healthy, declared));
+                                  less_healthy(well, healthy_run(healthy, of_healthy, declared)));
   EXPECT_EQ(none.verdict, DiagnosisVerdict::no_deviation);
 }
 
@@ -375,7 +375,7 @@ TEST(Diagnose, BetweenTwoRunsTellsNothingThatExplainsLessThanATenthOfWhatIsLeft)
     const Record sick = with_wave(measured(truth, 52), wave_um);
     toy::ToyReplica of_sick(sick);
     const Diagnosis d = diagnose({sick, of_sick, {}, toy::candidates()},
-                                 less_healthy(sick, healthy, of_healthy, {}));
+                                 less_healthy(sick, healthy_run(healthy, of_healthy, {})));
     EXPECT_EQ(names_squareness(d), wave_um == 0.2);
     EXPECT_TRUE(names_squareness(diagnosed(sick))) << wave_um;  // against the declared machine
   }
@@ -456,9 +456,9 @@ TEST(LessHealthy, RefusesForcesThatOneRunKnowsAlone) {
   toy::ToyReplica of_healthy(healthy);
   now.signals.push_back(
       {SignalKind::applied_force, kX, "push", std::vector<double>(now.samples(), 0.0), 0});
-  EXPECT_THROW(less_healthy(now, healthy, of_healthy, Machine()), MeasurementError);
+  EXPECT_THROW(less_healthy(now, healthy_run(healthy, of_healthy, Machine())), MeasurementError);
   healthy.signals.push_back(now.signals.back());
-  EXPECT_NO_THROW(less_healthy(now, healthy, of_healthy, Machine()));
+  EXPECT_NO_THROW(less_healthy(now, healthy_run(healthy, of_healthy, Machine())));
 }
 
 TEST(LessHealthy, HoldsAgainstThePieceAsItWasClamped) {
@@ -466,7 +466,8 @@ TEST(LessHealthy, HoldsAgainstThePieceAsItWasClamped) {
   move_number(clamped, "effects.setup.piece_offset.shift_um.x", 15);
   const Record healthy = measured(clamped, 41), now = measured(clamped, 42);
   toy::ToyReplica of_healthy(healthy);
-  const DifferentialRecord difference = less_healthy(now, healthy, of_healthy, Machine());
+  const DifferentialRecord difference =
+      less_healthy(now, healthy_run(healthy, of_healthy, Machine()));
   EXPECT_NEAR(number_of(difference.healthy, "effects.setup.piece_offset.shift_um.x"), 15, 0.05);
   EXPECT_NEAR(difference.off[0], 0.5 * toy::kProbeNoise, 0.1 * toy::kProbeNoise);  // of 4 laps
   // No reading is left out because the piece is not where it is declared to be.

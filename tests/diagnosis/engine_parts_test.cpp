@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "diagnosis/search/contest.hpp"
+#include "diagnosis/search/generic_laws.hpp"
 #include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/least_squares.hpp"
 #include "diagnosis/search/noise_audit.hpp"
@@ -52,6 +53,17 @@ TEST(NoiseAudit, TellsFrequencyAndAmplitudeOfWhatDoesNotRepeat) {
   toy::measure(quiet, Machine(), 6);
   toy::ToyReplica of_quiet(quiet);
   EXPECT_TRUE(Evidence(quiet, of_quiet, Machine()).noise().lines.empty());
+}
+
+TEST(GenericLaws, TakeANameAwayWhereTheyClearlyDoBetter) {
+  // Friction that differs with the direction, of which the model is wrong by 1.4 %.
+  EXPECT_FALSE(takes_names_away(20600, 1, 20310, 71));
+  // What no effect does: the best one imitates a third of it.
+  EXPECT_TRUE(takes_names_away(268900, 1, 101200, 16700));
+  // Where little is to be gained, what a law is to gain at all decides.
+  EXPECT_FALSE(takes_names_away(160, 1, 100, 60));
+  EXPECT_TRUE(takes_names_away(170, 1, 100, 60));
+  EXPECT_TRUE(takes_names_away(184300, 2, 184200, 9300));
 }
 
 TEST(Evidence, CleanResidualIsChiSquareWithOnePerSample) {

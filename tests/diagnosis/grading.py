@@ -231,12 +231,34 @@ def summary(rows):
     ratios = [r["after_over_floor"] for r in single if r["top"] and r["after_over_floor"]]
     out["held-out RMS after / floor, worst signal, median / p95"] = (
         f"{statistics.median(ratios):.3f} / {percentile(ratios, 95):.3f}" if ratios else "none")
-    moved = [r["transfer"] for r in rows if "transfer" in r]
-    if moved:
-        out["circles to S piece: error left of the declared model's, median / p95"] = (
-            f"{100 * statistics.median(moved):.1f} % / {100 * percentile(moved, 95):.0f} % (n = {len(moved)})")
+    out.update(transferred(clean, strong))
     seconds = [r["seconds"] for r in rows]
     out["processor time of a diagnosis, median / largest [s]"] = f"{statistics.median(seconds):.1f} / {max(seconds):.1f}"
+    return out
+
+
+def transferred(clean, strong):
+    """What models found on circles and lines leave of another piece's readings. Where the declared model is off by
+    less than ten times what noise leaves, the share of it is about noise and says little of what was found."""
+    out, of = {}, "circles to S piece"
+    noise = [r["transfer_um"][1] for r in clean if "transfer_um" in r]
+    some = [r["transfer_um"] for r in strong if "transfer_um" in r]
+    if noise:
+        out[f"{of}, clean machines: left, median / most"] = (
+            f"{1e3 * statistics.median(noise):.0f} / {1e3 * max(noise):.0f} nm (n = {len(noise)})")
+    if some:
+        left = [after for _, after in some]
+        out[f"{of}: left, median / p95"] = (
+            f"{1e3 * statistics.median(left):.0f} / {1e3 * percentile(left, 95):.0f} nm (n = {len(some)})")
+    least = {"": 0.0}
+    if noise:
+        seen = 10 * statistics.median(noise)
+        least[f", where that is over {1e3 * seen:.0f} nm"] = seen
+    for text, above in least.items():
+        shares = [after / before for before, after in some if before > above]
+        if shares:
+            out[f"{of}: left of the declared model's{text}, median / p95"] = (
+                f"{100 * statistics.median(shares):.1f} % / {100 * percentile(shares, 95):.0f} % (n = {len(shares)})")
     return out
 
 

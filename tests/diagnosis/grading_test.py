@@ -41,6 +41,18 @@ class Grading(unittest.TestCase):
         minor = grading.grade(TRUTH, report(found("backlash", "X"), found("kv_error", "X", minor=True)), 1)
         self.assertTrue(minor["top"] and not minor["exact"])
 
+    def test_another_piece_is_held_against_what_noise_leaves(self):
+        limit = [{"name": "X.backlash", "detection_limit": 0.5, "excited": True}]
+        right = report(found("backlash", "X", "effects.X.backlash.gap_um", 4.0, 3.9, 4.1), excitation=limit)
+        single = [grading.grade(TRUTH, right, 1) | {"transfer_um": um} for um in ([2.0, 0.02], [0.1, 0.05])]
+        clean = grading.grade({"kind": "clean", "effects": []}, report(verdict="NO DEVIATION"), 1) | {"transfer_um": [0.04, 0.02]}
+        of = "circles to S piece"
+        told = grading.summary([*single, clean])
+        self.assertEqual(told[f"{of}, clean machines: left, median / most"], "20 / 20 nm (n = 1)")
+        self.assertEqual(told[f"{of}: left, median / p95"], "35 / 50 nm (n = 2)")
+        self.assertEqual(told[f"{of}: left of the declared model's, median / p95"], "25.5 % / 50 % (n = 2)")
+        self.assertEqual(told[f"{of}: left of the declared model's, where that is over 200 nm, median / p95"], "1.0 % / 1 % (n = 1)")
+
     def test_a_wave_half_a_turn_on_is_the_same(self):
         key = "effects.probe.tip_lobing."
         truth = {"kind": "single", "effects": [{"name": "tip_lobing", "place": "probe", "parameters": {"amplitude_um": -2.0, "phase_deg": 10.0}}],

@@ -104,23 +104,44 @@ TEST_F(DiagnoseCli, RefusesWhatItCannotUseAndLeavesNothingBehind) {
   EXPECT_EQ(read_text(scratch_ / "mine/thesis.txt"), "do not lose");
 }
 
-TEST_F(DiagnoseCli, TwoMachinesAreComparedAgainstARunLessItsHealthyOne) {
-  write_text(scratch_ / "strokes.ngc", "G21 G90 G94\nG1 X10 F3000\nX0\nX10\nX0\nM30\n");
-  const std::string run = scratch_ / "run",
-                    machine = std::string(VCNC_SOURCE_DIR) + "/configs/machines/trunnion.toml";
-  const Said ran = vcnc("run " + (scratch_ / "strokes.ngc") + " --machine " + machine +
-                        " --inject X.coulomb.level_N=200 --in-process --no-report --out " + run);
-  ASSERT_EQ(ran.code, 0) << ran.err;
-  // RMS of what the declared machine is off the force of X, which has no friction.
-  const auto off = [&](const std::string& more) {
-    const Said said =
-        vcnc("diagnose " + run + " --model " + machine + " --compare-only " + machine + more);
-    EXPECT_EQ(said.code, 0) << said.err;
-    const std::size_t row = said.out.find("force X"), value = said.out.find("run", row) + 3;
-    return row == std::string::npos ? -1.0 : std::stod(said.out.substr(value));
+TEST_F(DiagnoseCli, RunsAreComparedLessTheHealthyOneOfTheirProgram) {
+  const std::string machine = std::string(VCNC_SOURCE_DIR) + "/configs/machines/trunnion.toml";
+  // X has no friction but what is put in.
+  const auto run = [&](const std::string& name, const std::string& far, int friction_N) {
+    write_text(scratch_ / "strokes.ngc",
+               "G21 G90 G94\nG1 X" + far + " F3000\nX0\nX" + far + "\nX0\nM30\n");
+    const std::string out = scratch_ / name;
+    const Said ran = vcnc("run " + (scratch_ / "strokes.ngc") + " --machine " + machine +
+                          fmt::format(" --inject X.coulomb.level_N={}", friction_N) +
+                          " --in-process --no-report --out " + out);
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    return out;
   };
-  EXPECT_GT(off(""), 50);
-  EXPECT_NEAR(off(" --reference " + run), 0, 1e-6);  // the healthy run is as far off
+  const std::string sick = run("sick", "10", 200), sicker = run("sicker", "10", 400),
+                    longer = run("longer", "20", 400);
+  // RMS of what the declared machine is off the force of X.
+  const auto off = [&](const std::string& of, const std::string& more) {
+    const Said said =
+        vcnc("diagnose " + sick + " --model " + machine + " --compare-only " + machine + more);
+    EXPECT_EQ(said.code, 0) << said.err;
+    std::size_t row = said.out.find("force X");
+    while (row != std::string::npos &&
+           said.out.substr(row, said.out.find('\n', row) - row).find(" " + of + " ") ==
+               std::string::npos)
+      row = said.out.find("force X", row + 1);
+    EXPECT_NE(row, std::string::npos) << of << " in " << said.out;
+    return row == std::string::npos
+               ? -1.0
+               : std::stod(said.out.substr(said.out.find(of, row) + of.size()));
+  };
+  const std::string less = " --reference " + sick,
+                    tests = " --test " + sicker + " --test " + longer;
+  EXPECT_GT(off("run", ""), 150);
+  EXPECT_NEAR(off("run", less), 0, 1e-6);  // the healthy run is as far off
+  const double alone = off(sicker, tests);
+  EXPECT_GT(alone, 300);
+  EXPECT_NEAR(off(sicker, less + tests), alone / 2, 0.01 * alone);
+  EXPECT_GT(off(longer, less + tests), 300);  // of another program: as it is
 }
 
 TEST_F(DiagnoseCli, TheMapHasItsReference) {
