@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 
 #include "diagnosis/findings.hpp"
@@ -82,27 +83,12 @@ void allow_for_form(const Evidence& evidence, const std::vector<double>& left,
   }
 }
 
-/// The record of the case is what is explained: what was measured, or `difference`.
-Diagnosis explained(const DiagnosisCase& of, const Record& raw,
-                    const DifferentialRecord* difference, DiagnosisOptions options,
-                    const KeepGoing& keep_going) {
-  Machine declared = of.declared;
-  FoundBeforehand before;
-  if (declared.effects.get<PeriodSlip>().null())
-    before.slip = find_period_slip(raw, of.replica.channels(), of.replica.predict(declared),
-                                   declared.probe.signal_period);
-  if (before.slip) declared.effects.get<PeriodSlip>() = *before.slip;
-  const std::vector<double> left =
-      difference ? std::vector<double>{} : left_by_commissioning(declared, of.replica.channels());
-  Evidence evidence(of.record, of.replica, declared, difference ? difference->noise_scale : 1,
-                    left);
-  before.chatter = find_chatter(evidence, declared, of.candidates,
-                                difference ? difference->noise : HealthyNoise{});
-  for (const Chatter& c : before.chatter) {
-    if (!c.hides_drive()) continue;
-    evidence.leave_out_drive(c.axis);
-    options.vibrating.push_back(c.axis);
-  }
+/// The options for what is explained: what was measured, or a difference.
+DiagnosisOptions fitting(DiagnosisOptions options, const Evidence& evidence,
+                         const DifferentialRecord* difference, const std::vector<double>& left,
+                         const std::vector<Chatter>& chatter) {
+  for (const Chatter& c : chatter)
+    if (c.hides_drive()) options.vibrating.push_back(c.axis);
   if (difference) {
     options.max_effects = std::min(options.max_effects, kMostChanges);
     options.few_effects = std::min(options.few_effects, kFewChanges);
@@ -119,12 +105,71 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
   options.form = kForm * evidence.count(Role::held_out);
   options.share_of_form = kShareOfForm;
   options.share_of_found = kShareOfFound;
-  SelectionResult selection =
-      select_effects_of(evidence, declared, of.candidates, options, keep_going);
-  bring_to_simplest_form(evidence, declared, options, selection.floor, selection.found);
-  Diagnosis d = findings_of(of, evidence, options, std::move(selection), std::move(before),
-                            difference != nullptr);
-  if (!left.empty())
+  return options;
+}
+
+/// What is explained, and against which machine.
+struct Question {
+  const DiagnosisCase& of;
+  const DifferentialRecord* difference;  ///< the record of the case is one; null: what was measured
+  Machine declared;
+  std::vector<double> left{};  ///< by commissioning
+};
+
+/// A search with everything that it was made with.
+struct Attempt {
+  /// `encoders`: a machine whose encoders make the noise; null: the declared one.
+  Attempt(const Question& question, FoundBeforehand known, const DiagnosisOptions& asked,
+          const KeepGoing& keep_going, const Machine* encoders)
+      : evidence(question.of.record, question.of.replica, question.declared,
+                 question.difference ? question.difference->noise_scale : 1, question.left),
+        before(std::move(known)) {
+    const auto& [of, difference, declared, left] = question;
+    if (encoders) evidence.reckon_with_rounding(*encoders);
+    before.chatter = find_chatter(evidence, declared, of.candidates,
+                                  difference ? difference->noise : HealthyNoise{});
+    for (const Chatter& c : before.chatter)
+      if (c.hides_drive()) evidence.leave_out_drive(c.axis);
+    options = fitting(asked, evidence, difference, left, before.chatter);
+    selection = select_effects_of(evidence, declared, of.candidates, options, keep_going);
+    bring_to_simplest_form(evidence, declared, options, selection.floor, selection.found);
+  }
+  Attempt(const Attempt&) = delete;  // what was selected refers to the evidence
+
+  Evidence evidence;
+  FoundBeforehand before;
+  DiagnosisOptions options;
+  SelectionResult selection;
+};
+
+/// The record of the case is what is explained: what was measured, or `difference`.
+Diagnosis explained(const DiagnosisCase& of, const Record& raw,
+                    const DifferentialRecord* difference, const DiagnosisOptions& asked,
+                    const KeepGoing& keep_going) {
+  Question question{of, difference, of.declared};
+  Machine& declared = question.declared;
+  FoundBeforehand before;
+  if (declared.effects.get<PeriodSlip>().null())
+    before.slip = find_period_slip(raw, of.replica.channels(), of.replica.predict(declared),
+                                   declared.probe.signal_period);
+  if (before.slip) declared.effects.get<PeriodSlip>() = *before.slip;
+  if (!difference) question.left = left_by_commissioning(declared, of.replica.channels());
+  auto search = std::make_unique<Attempt>(question, before, asked, keep_going, nullptr);
+  const Machine found = search->selection.found.machine;
+  bool anew = !search->selection.interrupted && search->evidence.underrates_rounding(found);
+  if (anew) {
+    of.replica.anchor(declared);
+    auto second = std::make_unique<Attempt>(question, before, asked, keep_going, &found);
+    anew = !second->selection.interrupted;
+    if (anew) search = std::move(second);
+  }
+  Diagnosis d = findings_of(of, search->evidence, search->options, std::move(search->selection),
+                            std::move(search->before), difference != nullptr);
+  if (anew)
+    d.notes.push_back(
+        "What was found lets the encoders make more noise than in the declared machine; all was "
+        "sought once more with that noise.");
+  if (!question.left.empty())
     d.notes.push_back(
         "As much as the model left of the healthy run that it was fitted to counts for its form "
         "and needs no cause.");

@@ -10,7 +10,8 @@
 namespace vcnc {
 namespace {
 
-constexpr double kLoud = 300;  ///< power over the noise around
+/// Power over the noise around; drives that do not vibrate by themselves have no line of 40.
+constexpr double kLoud = 60;
 constexpr double kFrequency = 2;
 constexpr double kAmplitude = 30;  ///< differs as much as the frequency does by kFrequency
 constexpr double kAsStrong = 3;

@@ -426,11 +426,13 @@ void Contest::look_ahead(const std::vector<Screened>& screened, std::vector<Cont
   const auto best =
       std::max_element(together.begin(), together.end(),
                        [](const Screened& x, const Screened& y) { return x.counted < y.counted; });
+  const auto [one, other] = pairs[static_cast<std::size_t>(best - together.begin())];
   const double single = all.empty() ? 0 : all.front().gain;
   const double least =
       std::max(rules_.threshold(ground_.held_out), 0.1 * rules_.excess(ground_.held_out));
-  if (best->counted < single + least) return;
-  const std::size_t other = pairs[static_cast<std::size_t>(best - together.begin())].second;
+  // One that does nothing beside another makes no pair of it.
+  const double either = std::max(screened[one].counted, screened[other].counted);
+  if (best->counted < std::max(single, either) + least) return;
   Contender c = contender({best->trial, screened[other].trial}, best->size, best->gain);
   c.needed = needed_of({c.candidate, candidate_of(screened[other])}, c.fit.held_out_of);
   if (counts(c.gain, c.fit.held_out_of) > single + least &&

@@ -12,6 +12,8 @@ namespace vcnc {
 namespace {
 
 constexpr double kShift = 10e-6;  // of a piece, to see what one does [m]
+/// Times what encoders were reckoned to make of a reading that they may make of it.
+constexpr double kUnderrated = 2;
 
 /// sum of a b, in doubles and several at a time.
 double dot(const float* a, const float* b, std::size_t n) {
@@ -54,43 +56,74 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
       replica_(replica),
       gathering_(replica),
       partition_(vcnc::partition(record)),
-      declared_(replica.predict(declared)) {
+      declared_(replica.predict(declared)),
+      noise_scale_(noise_scale),
+      form_(form) {
   for (const ComparedChannel& channel : replica.channels()) {
     const MeasuredSignal* signal = record.find(channel.kind, channel.axis);
     if (!signal) throw std::logic_error("a replica predicts a channel that the record has not");
     measured_.push_back(signal->value);
   }
   raw_valid_ = comparable_samples(record, replica.channels(), measured_, declared_);
-  SeriesOfChannels difference = measured_, rounding = replica.rounding(declared);
-  for (std::size_t c = 0; c < difference.size(); ++c)
-    for (std::size_t k = 0; k < difference[c].size(); ++k) difference[c][k] -= declared_[c][k];
-  mask(difference);
-  mask(rounding);
-  const std::vector<Stretch>& laps = partition_.stretches;
-  const std::vector<SeriesOfChannels> per_shift =
-      readings_per_shift(with_piece_shifted(declared, kShift));
+  difference_ = measured_;
+  for (std::size_t c = 0; c < difference_.size(); ++c)
+    for (std::size_t k = 0; k < difference_[c].size(); ++k) difference_[c][k] -= declared_[c][k];
+  mask(difference_);
+  per_shift_ = readings_per_shift(with_piece_shifted(declared, kShift));
   // A piece, an axis or a clock that drifts from lap to lap is no noise of the samples.
-  if (partition_.repeated && !per_shift.empty()) {
+  if (partition_.repeated && !per_shift_.empty()) {
     std::vector<Machine> shifted = with_axes_shifted(declared, kShift);
     shifted.push_back(with_older_readings(declared));
     std::vector<SeriesOfChannels> all = readings_per_shift(shifted);
-    all.insert(all.end(), per_shift.begin(), per_shift.end());
-    take_out_shifts(laps, all, difference);
+    all.insert(all.end(), per_shift_.begin(), per_shift_.end());
+    take_out_shifts(partition_.stretches, all, difference_);
   }
-  events_ = lap_events(partition_, record.period, replica.channels(), difference);
+  events_ = lap_events(partition_, record.period, replica.channels(), difference_);
   leave_out(events_);
-  mask(difference);
-  mask(rounding);
-  noise_ = audit_noise(record, partition_, replica.channels(), difference, rounding);
+  mask(difference_);
+  reckon_with_rounding(declared);
+}
+
+void Evidence::reckon_with_rounding(const Machine& machine) {
+  const SeriesOfChannels rounding = rounding_of(machine);
+  noise_ = audit_noise(record_, partition_, replica_.channels(), difference_, rounding);
   for (std::size_t c = 0; c < noise_.channels.size(); ++c) {
     ChannelNoise& channel = noise_.channels[c];
-    const double louder = c < form.size() ? std::hypot(1, form[c] / channel.rms) : 1;
-    channel.filter.scale *= noise_scale * louder;
+    const double louder = c < form_.size() ? std::hypot(1, form_[c] / channel.rms) : 1;
+    channel.filter.scale *= noise_scale_ * louder;
     channel.of_laps /= louder * louder;
   }
   count_valid();
-  if (!rounding.empty() && !per_shift.empty())
-    whiten_shifts(per_shift, rms_shift(laps, per_shift, rounding));
+  of_shifts_ = {};
+  if (rounding.empty()) return;
+  if (!per_shift_.empty()) whiten_shifts(rms_shift(partition_.stretches, per_shift_, rounding));
+  rounding_ = rms_of_readings(rounding);
+}
+
+bool Evidence::underrates_rounding(const Machine& machine) const {
+  if (rounding_.empty()) return false;
+  const std::vector<double> now = rms_of_readings(rounding_of(machine));
+  for (std::size_t c = 0; c < now.size(); ++c)
+    if (now[c] > kUnderrated * rounding_[c] && now[c] > noise_.channels[c].rms) return true;
+  return false;
+}
+
+std::vector<double> Evidence::rms_of_readings(const SeriesOfChannels& series) const {
+  std::vector<double> rms(series.size(), 0.0);
+  for (std::size_t c = 0; c < series.size(); ++c) {
+    if (replica_.channels()[c].kind != SignalKind::deflection) continue;
+    double sum = 0, n = 0;
+    for (const double x : series[c])
+      if (std::isfinite(x)) sum += x * x, n += 1;
+    if (n > 0) rms[c] = std::sqrt(sum / n);
+  }
+  return rms;
+}
+
+SeriesOfChannels Evidence::rounding_of(const Machine& machine) const {
+  SeriesOfChannels rounding = replica_.rounding(machine);
+  mask(rounding);
+  return rounding;
 }
 
 void Evidence::leave_out(const std::vector<LapEvent>& events) {
@@ -104,6 +137,9 @@ void Evidence::leave_out(const std::vector<LapEvent>& events) {
 }
 
 void Evidence::count_valid() {
+  valid_.clear();
+  fitted_count_.clear();
+  held_out_count_.clear();
   for (std::size_t c = 0; c < raw_valid_.size(); ++c) {
     valid_.emplace_back(record_.samples(), 0);
     const std::size_t order = noise_.channels[c].filter.a.size();
@@ -122,13 +158,12 @@ void Evidence::count_valid() {
   }
 }
 
-void Evidence::whiten_shifts(const std::vector<SeriesOfChannels>& per_shift,
-                             const Eigen::Vector3d& shift) {
+void Evidence::whiten_shifts(const Eigen::Vector3d& shift) {
   std::vector<Column::Channels> of_shifts;
-  for (std::size_t j = 0; j < per_shift.size(); ++j) {
-    Column::Channels& column = of_shifts.emplace_back(per_shift[j].size());
+  for (std::size_t j = 0; j < per_shift_.size(); ++j) {
+    Column::Channels& column = of_shifts.emplace_back(per_shift_[j].size());
     for (std::size_t c = 0; c < column.size(); ++c) {
-      std::vector<double> change = per_shift[j][c];
+      std::vector<double> change = per_shift_[j][c];
       for (double& d : change) d *= shift[static_cast<Eigen::Index>(j)];
       if (!change.empty() && keep_comparable(c, change)) column[c] = whiten(c, change);
     }

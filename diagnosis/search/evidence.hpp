@@ -87,6 +87,13 @@ class Evidence {
   void anchor(const Machine& machine) { replica_.anchor(machine); }
   /// From now on what the drive of an axis records counts for nothing. Not after columns were made.
   void leave_out_drive(std::size_t axis);
+  /// Whether encoders make more of the readings in this machine than of samples' noise, and clearly
+  /// more than was reckoned with: a compliance shows with which force friction holds an axis that
+  /// rests anywhere within a step of its encoder, another one in every lap.
+  bool underrates_rounding(const Machine& machine) const;
+  /// From now on noise is what encoders make of it in this machine; all drives count again. Not
+  /// with columns made before.
+  void reckon_with_rounding(const Machine& machine);
   /// W (y - yhat).
   Column residual(const Prediction& prediction) const;
   /// W (changed - base) / step.
@@ -124,9 +131,11 @@ class Evidence {
   /// What these machines make of the readings of the probe, of what each is shifted by [m]; empty
   /// where there are none.
   std::vector<SeriesOfChannels> readings_per_shift(const std::vector<Machine>& shifted) const;
+  SeriesOfChannels rounding_of(const Machine& machine) const;
+  std::vector<double> rms_of_readings(const SeriesOfChannels& series) const;  ///< else nought
   void leave_out(const std::vector<LapEvent>& events);
   void count_valid();
-  void whiten_shifts(const std::vector<SeriesOfChannels>& per_shift, const Eigen::Vector3d& shift);
+  void whiten_shifts(const Eigen::Vector3d& shift);
   /// Says nothing of samples that cannot be compared.
   void mask(SeriesOfChannels& series) const;
   /// Adds the products in one block and channel.
@@ -142,8 +151,13 @@ class Evidence {
   std::vector<std::vector<char>> raw_valid_, valid_;
   std::vector<double> fitted_count_, held_out_count_;  ///< of valid_, per channel
   std::vector<LapEvent> events_;
+  SeriesOfChannels difference_;              ///< from the declared machine, without drifts
+  std::vector<SeriesOfChannels> per_shift_;  ///< of the piece; empty without a probe
+  double noise_scale_;
+  std::vector<double> form_;
   NoiseAudit noise_;
   ShiftWhitening of_shifts_;
+  std::vector<double> rounding_;  ///< RMS of the readings' that is reckoned with
 };
 
 }  // namespace vcnc

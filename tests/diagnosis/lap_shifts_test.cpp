@@ -147,5 +147,38 @@ TEST(Evidence, ShiftsThatRoundingMakesAreNoise) {
   EXPECT_LT(std::abs(above(knowing)), 0.05);
 }
 
+/// The toy machine whose encoder lets the piece lie elsewhere only where the axes are not square.
+class RoundingWhereSkewReplica : public RoundingReplica {
+ public:
+  using RoundingReplica::RoundingReplica;
+  std::vector<std::vector<double>> rounding(const Machine& m) const override {
+    std::vector<std::vector<double>> all = RoundingReplica::rounding(m);
+    const double share = m.effects.get<Squareness>().xy == 0 ? 1e-3 : 1;
+    for (double& r : all[2]) r *= share;
+    return all;
+  }
+};
+
+TEST(Evidence, RoundingIsReckonedWithAsInWhatWasFound) {
+  const Machine declared, found = toy::machine({{"effects.geometry.squareness.xy_urad", 2000}});
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, found, 17);
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::deflection)
+      for (std::size_t k = 0; k < s.value.size(); ++k)
+        s.value[k] += k / 1000 % 3 == 0 ? 1e-6 : -0.5e-6;
+  RoundingWhereSkewReplica replica(record);
+  Evidence e(record, replica, declared);
+  const auto above = [&] {
+    return e.chi2(e.residual(e.predict(found)), Role::both) / e.count(Role::both) - 1;
+  };
+  EXPECT_FALSE(e.underrates_rounding(declared));
+  EXPECT_TRUE(e.underrates_rounding(found));
+  EXPECT_GT(above(), 1);
+  e.reckon_with_rounding(found);
+  EXPECT_FALSE(e.underrates_rounding(found));
+  EXPECT_LT(std::abs(above()), 0.1);
+}
+
 }  // namespace
 }  // namespace vcnc
