@@ -429,10 +429,10 @@ class Report {
     const bool anything = found().found() > 0;
     LawFit law;
     if (!quiet)
-      law = best_law(
-          evidence_, found(),
-          anything ? doubt_of(options_, found().explained(), base, now) : doubt_of(options_),
-          options_);
+      law = best_law(evidence_, found(),
+                     anything ? doubt_of(options_, found().explained(), base, now, found().rounding)
+                              : doubt_of(options_),
+                     options_);
     // A law that does better than all that was named takes the names away.
     if (anything) {
       LawFit instead = selection_.law_alone

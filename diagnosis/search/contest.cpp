@@ -85,9 +85,9 @@ Contest::Contest(const ContestRules& rules, const FittedMachine& now)
       now_(now),
       linear_(now.linear()),
       ground_(rules.evidence, now.residual, linear_),
-      doubt_(now.found() == 0
-                 ? doubt_of(rules.options)
-                 : doubt_of(rules.options, now.explained(), rules.base_of, ground_.held_out_of)) {}
+      doubt_(now.found() == 0 ? doubt_of(rules.options)
+                              : doubt_of(rules.options, now.explained(), rules.base_of,
+                                         ground_.held_out_of, now.rounding)) {}
 
 std::vector<Contender> Contest::contenders() {
   const std::vector<Screened> all_trials = screen(rules_.evidence, ground_, doubt_,

@@ -27,9 +27,11 @@ Doubt doubt_of(const DiagnosisOptions& options) {
 }
 
 Doubt doubt_of(const DiagnosisOptions& options, const std::vector<Explained>& found,
-               const std::vector<double>& before, const std::vector<double>& left) {
+               const std::vector<double>& before, const std::vector<double>& left,
+               const std::vector<double>& rounding) {
   Doubt doubt = doubt_of(options);
   doubt.resize(left.size(), 0.0);
+  for (std::size_t c = 0; c < rounding.size(); ++c) doubt[c] += rounding[c];
   for (const Explained& explained : found) {
     const double wrong = wrong_by(options.share_of_found, explained, left);
     for (std::size_t c = 0; c < left.size(); ++c) doubt[c] += wrong * std::max(0.0, explained[c]);

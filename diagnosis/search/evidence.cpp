@@ -97,15 +97,24 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
   of_shifts_ = {};
   if (rounding.empty()) return;
   if (!per_shift_.empty()) whiten_shifts(rms_shift(partition_.stretches, per_shift_, rounding));
-  rounding_ = rms_of_readings(rounding);
+  rms_of_rounding_ = rms_of_readings(rounding);
+  chi2_of_rounding_ = chi2_of(whiten(rounding), Role::held_out);
 }
 
 bool Evidence::underrates_rounding(const Machine& machine) const {
-  if (rounding_.empty()) return false;
+  if (rms_of_rounding_.empty()) return false;
   const std::vector<double> now = rms_of_readings(rounding_of(machine));
   for (std::size_t c = 0; c < now.size(); ++c)
-    if (now[c] > kUnderrated * rounding_[c] && now[c] > noise_.channels[c].rms) return true;
+    if (now[c] > kUnderrated * rms_of_rounding_[c] && now[c] > noise_.channels[c].rms) return true;
   return false;
+}
+
+std::vector<double> Evidence::rounding_beyond_reckoned(const Machine& machine) const {
+  if (chi2_of_rounding_.empty()) return {};
+  std::vector<double> beyond = chi2_of(whiten(rounding_of(machine)), Role::held_out);
+  for (std::size_t c = 0; c < beyond.size(); ++c)
+    beyond[c] = std::max(0.0, beyond[c] - chi2_of_rounding_[c]);
+  return beyond;
 }
 
 std::vector<double> Evidence::rms_of_readings(const SeriesOfChannels& series) const {

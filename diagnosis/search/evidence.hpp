@@ -111,6 +111,9 @@ class Evidence {
   double chi2(const Column& column, Role role) const;
   /// Of every channel.
   std::vector<double> chi2_of(const Column& column, Role role) const;
+  /// Held-out chi-square of every channel that encoders make in a machine beyond what was reckoned
+  /// with; empty where nothing is rounded.
+  std::vector<double> rounding_beyond_reckoned(const Machine& machine) const;
   /// RMS of y - yhat in SI over the samples that count.
   double rms(const Prediction& prediction, std::size_t channel, Role role) const;
 
@@ -157,7 +160,8 @@ class Evidence {
   std::vector<double> form_;
   NoiseAudit noise_;
   ShiftWhitening of_shifts_;
-  std::vector<double> rounding_;  ///< RMS of the readings' that is reckoned with
+  /// What is reckoned with: of the readings' rounding, and held-out chi-square of every channel's.
+  std::vector<double> rms_of_rounding_, chi2_of_rounding_;
 };
 
 }  // namespace vcnc

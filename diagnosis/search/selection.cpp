@@ -82,8 +82,10 @@ class Search {
     evidence_.anchor(now.machine);
     if (!accept_one(now, contenders, first)) return now;
     while (going_) {
+      now.rounding = evidence_.rounding_beyond_reckoned(now.machine);
       look_again(now);
       exchange(now);
+      now.rounding = evidence_.rounding_beyond_reckoned(now.machine);
       ladder.push_back(step_of(now, ladder.size()));
       if (now.found() >= options_.max_effects) break;
       if (imitates(now)) break;

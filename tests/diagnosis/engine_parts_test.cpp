@@ -181,6 +181,7 @@ TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {
   EXPECT_EQ(doubt_of(options), (Doubt{50, 0}));
   const Doubt doubt = doubt_of(options, {{2000, -100}}, {2500, 500}, {500, 600});
   EXPECT_EQ(doubt, (Doubt{70, 100}));
+  EXPECT_EQ(doubt_of(options, {{2000, -100}}, {2500, 500}, {500, 600}, {3, 4}), (Doubt{73, 104}));
   // 300 of 500 come from the first channel; a loss takes nothing away, a small gain all of itself.
   EXPECT_DOUBLE_EQ(counted(500, {500, 600}, {200, 400}, doubt), 330);
   EXPECT_DOUBLE_EQ(counted(160, {500, 600}, {540, 400}, doubt), 60);

@@ -175,8 +175,11 @@ TEST(Evidence, RoundingIsReckonedWithAsInWhatWasFound) {
   EXPECT_FALSE(e.underrates_rounding(declared));
   EXPECT_TRUE(e.underrates_rounding(found));
   EXPECT_GT(above(), 1);
+  EXPECT_EQ(e.rounding_beyond_reckoned(declared), (std::vector<double>{0, 0, 0}));
+  EXPECT_GT(e.rounding_beyond_reckoned(found)[2], 1000);
   e.reckon_with_rounding(found);
   EXPECT_FALSE(e.underrates_rounding(found));
+  EXPECT_EQ(e.rounding_beyond_reckoned(found)[2], 0);
   EXPECT_LT(std::abs(above()), 0.1);
 }
 
