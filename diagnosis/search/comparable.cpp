@@ -68,21 +68,21 @@ void mask_settled(const Record& record, const std::vector<ComparedChannel>& chan
 
 /// Of the ball at every sample [m].
 std::vector<double> deflections(const std::vector<ComparedChannel>& channels,
-                                const Prediction& declared, std::size_t samples) {
+                                const Prediction& deflected, std::size_t samples) {
   std::vector<double> all(samples, 0.0);
   for (std::size_t c = 0; c < channels.size(); ++c)
     for (std::size_t k = 0; channels[c].kind == SignalKind::deflection && k < samples; ++k)
-      if (std::isfinite(declared[c][k])) all[k] = std::hypot(all[k], declared[c][k]);
+      if (std::isfinite(deflected[c][k])) all[k] = std::hypot(all[k], deflected[c][k]);
   return all;
 }
 
 void mask_touching(const Record& record, const std::vector<ComparedChannel>& channels,
-                   const Prediction& declared, Flags& valid) {
+                   const Prediction& deflected, Flags& valid) {
   const auto samples = [&](double time) {
     return static_cast<std::size_t>(std::round(time / record.period));
   };
   const std::size_t n = record.samples();
-  const std::vector<double> deflection = deflections(channels, declared, n);
+  const std::vector<double> deflection = deflections(channels, deflected, n);
   const double least = kFree * *std::max_element(deflection.begin(), deflection.end());
   const auto free = [&](std::size_t k) { return deflection[k] <= least; };
   std::vector<std::size_t> readings;
@@ -92,7 +92,7 @@ void mask_touching(const Record& record, const std::vector<ComparedChannel>& cha
   const auto swings = [&](std::size_t k) {
     for (std::size_t j = k > samples(kHalfSwing) ? k - samples(kHalfSwing) : 0; j < k; ++j) {
       double along = 0;
-      for (const std::size_t c : readings) along += declared[c][j] * declared[c][k];
+      for (const std::size_t c : readings) along += deflected[c][j] * deflected[c][k];
       if (along < 0) return true;
     }
     return false;
@@ -144,10 +144,10 @@ std::vector<double> ways(const Record& record) {
 }
 
 void mask_resting_ball(const Record& record, const std::vector<ComparedChannel>& channels,
-                       const Prediction& declared, Flags& valid) {
+                       const Prediction& deflected, Flags& valid) {
   const std::vector<double> way = ways(record);
   if (way.empty()) return;
-  const std::vector<double> deflection = deflections(channels, declared, way.size());
+  const std::vector<double> deflection = deflections(channels, deflected, way.size());
   const double least = kFree * *std::max_element(deflection.begin(), deflection.end());
   std::vector<double> usual;
   for (std::size_t k = 0; k < way.size(); ++k)
@@ -207,7 +207,8 @@ void mask_turning_drag(const Record& record, const std::vector<ComparedChannel>&
 std::vector<std::vector<char>> comparable_samples(const Record& record,
                                                   const std::vector<ComparedChannel>& channels,
                                                   const SeriesOfChannels& measured,
-                                                  const Prediction& declared) {
+                                                  const Prediction& declared,
+                                                  const Prediction& deflected) {
   Flags valid;
   for (std::size_t c = 0; c < channels.size(); ++c) {
     std::vector<char>& flags = valid.emplace_back(record.samples());
@@ -216,8 +217,8 @@ std::vector<std::vector<char>> comparable_samples(const Record& record,
   }
   mask_standing(record, channels, valid);
   mask_settled(record, channels, valid);
-  mask_touching(record, channels, declared, valid);
-  mask_resting_ball(record, channels, declared, valid);
+  mask_touching(record, channels, deflected, valid);
+  mask_resting_ball(record, channels, deflected, valid);
   mask_turning_drag(record, channels, measured, declared, valid);
   return valid;
 }

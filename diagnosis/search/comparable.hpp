@@ -14,10 +14,12 @@
 
 namespace vcnc {
 
-/// One flag per channel and sample; `declared` is what the declared machine would have measured.
+/// One flag per channel and sample; `declared` is what the declared machine would have measured,
+/// `deflected` the same with readings that say where the ball is: none where its period slipped.
 std::vector<std::vector<char>> comparable_samples(const Record& record,
                                                   const std::vector<ComparedChannel>& channels,
                                                   const SeriesOfChannels& measured,
-                                                  const Prediction& declared);
+                                                  const Prediction& declared,
+                                                  const Prediction& deflected);
 
 }  // namespace vcnc

@@ -27,6 +27,12 @@ double dot(const float* a, const float* b, std::size_t n) {
   return ((sum[0] + sum[4]) + (sum[1] + sum[5])) + ((sum[2] + sum[6]) + (sum[3] + sum[7]));
 }
 
+/// Whose readings say where the ball is.
+Machine without_slip(Machine machine) {
+  machine.effects.get<PeriodSlip>() = {};
+  return machine;
+}
+
 }  // namespace
 
 bool Column::zero() const {
@@ -64,7 +70,8 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
     if (!signal) throw std::logic_error("a replica predicts a channel that the record has not");
     measured_.push_back(signal->value);
   }
-  raw_valid_ = comparable_samples(record, replica.channels(), measured_, declared_);
+  raw_valid_ = comparable_samples(record, replica.channels(), measured_, declared_,
+                                  replica.predict(without_slip(declared)));
   difference_ = measured_;
   for (std::size_t c = 0; c < difference_.size(); ++c)
     for (std::size_t k = 0; k < difference_[c].size(); ++k) difference_[c][k] -= declared_[c][k];

@@ -41,6 +41,7 @@ import program
 NOT_REPEATABLE = {"encoder_quantisation", "bus_loss", "bus_jitter", "frame_vibration", "mains_hum", "adc_noise",
                   "sample_jitter", "dropped_samples"}
 BEFORE_THE_COMMAND = {"corner_cutting", "chord_error", "path_filter"}
+STOPS_AT_ONCE = {"contact_loss"}  # the NC unit's own check of the readings stops the machine: an alarm, no record of it
 SET_UP = {"piece_offset", "piece_tilt"}  # clamped anew for every run: never a finding
 S_PIECE = HERE.parents[1] / "configs/pieces/s_eq1.toml"
 MODEL = "found.toml"  # what a diagnosis calls the machine it found
@@ -107,7 +108,7 @@ def draw_own(rng, entry):
         elif short.startswith("phase"):
             value = float(rng.uniform(-180, 180))
         elif short == "start_s":
-            value = float(rng.uniform(10, 50))
+            value = float(rng.uniform(10, 40))  # the program ends after 44
         elif short in WHOLE or not np.any(nominal):
             value = nominal
         elif np.any(default):
@@ -145,7 +146,7 @@ def leave_out(s, entries):
 
 
 def own_scenarios(rng, counts, entries):
-    names = sorted(set(entries) - NOT_REPEATABLE - BEFORE_THE_COMMAND - SET_UP)
+    names = sorted(set(entries) - NOT_REPEATABLE - BEFORE_THE_COMMAND - STOPS_AT_ONCE - SET_UP)
     order, out = [], []
     for kind, count in counts.items():
         if kind == "unknown":
@@ -256,7 +257,7 @@ def transfer(vcnc, work, s, row, per_shift):
     named = s["kind"] == "single" and row.get("strength", 0) >= 3 and row.get("top")
     if "failed" in row or not (named or s["kind"] == "clean"):
         return {}
-    if any(e["name"] in ("period_slip", "contact_loss") for e in s["effects"]):
+    if any(e["name"] == "period_slip" for e in s["effects"]):
         return {}
     truth = {k: v for k, v in s["assignments"].items() if not k.startswith("effects.setup.")}
     name = f"transfer_{s['number']}"
@@ -407,8 +408,8 @@ everything twice. The ring stands 72 mm off the C axis, so that an error of its 
 rest is a matter of nanometres of motion, and the two models need not agree on it. The declared suspension of the probe is light, as the
 generator's contact is quasi-static. L is the detection limit that the diagnosis states itself: five standard
 deviations, and what a gain and a consequence must reach to be told beside what the model gets wrong about the healthy machine. Sizes
-are drawn log-uniformly within a factor of three about a typical one, so that some lie below L, where silence is right. Noise effects, the set-up and what happens before
-the logged command are not injected as findings.
+are drawn log-uniformly within a factor of three about a typical one, so that some lie below L, where silence is right. Noise effects, the set-up, what happens before
+the logged command and what stops the machine at once are not injected as findings.
 
 ## The generator itself
 

@@ -18,6 +18,7 @@ const std::vector<ComparedChannel> kChannels{
 struct RecordedRamp {
   Record record;
   SeriesOfChannels measured, predicted;
+  double slipped = 0;  ///< of all readings [m]
 
   explicit RecordedRamp(const std::vector<double>& x) {
     const std::vector<double> rest(x.size(), 0.0);
@@ -29,7 +30,10 @@ struct RecordedRamp {
       measured[2][k] = 100e-6 + 100e-9 * gaussian_noise(3, 0, k)[0];
   }
   std::vector<std::vector<char>> comparable() const {
-    return comparable_samples(record, kChannels, measured,
+    SeriesOfChannels read = measured, told = predicted;
+    for (SeriesOfChannels* all : {&read, &told})
+      for (double& reading : (*all)[2]) reading += slipped;
+    return comparable_samples(record, kChannels, read, Prediction(told.begin(), told.end()),
                               Prediction(predicted.begin(), predicted.end()));
   }
 };
@@ -105,11 +109,14 @@ TEST(Comparable, NotReadingsAboutTheMomentOfReleaseHoweverLongTheBallSwings) {
 TEST(Comparable, NotReadingsAboutTheMomentOfTouching) {
   RecordedRamp run(ramp(0.05));
   for (std::size_t k = 0; k < 800; ++k) run.measured[2][k] = run.predicted[2][k] = 0;
-  const auto flags = run.comparable();
-  EXPECT_EQ(left_out(flags[2]), 100U);
-  EXPECT_TRUE(flags[2][749] && flags[2][850]);
-  EXPECT_FALSE(flags[2][750] || flags[2][849]);
-  EXPECT_EQ(left_out(flags[0]), 0U);
+  for (const double slipped : {0.0, 20e-6}) {
+    run.slipped = slipped;
+    const auto flags = run.comparable();
+    EXPECT_EQ(left_out(flags[2]), 100U);
+    EXPECT_TRUE(flags[2][749] && flags[2][850]);
+    EXPECT_FALSE(flags[2][750] || flags[2][849]);
+    EXPECT_EQ(left_out(flags[0]), 0U);
+  }
 }
 
 TEST(Comparable, AReadingThatGoesThroughZeroIsNoTouch) {

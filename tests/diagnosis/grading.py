@@ -165,6 +165,8 @@ def grade(answer, report, seconds):
                     # A wave half a turn on is the same wave.
                     if "amplitude" in key and key[-2:] not in (".x", ".y", ".z") and any("phase" in k for k in numbers_of(f)):
                         true = math.copysign(true, number["value"])
+                    if "weight_imbalance.torque" in key:  # so is a weight on the other side that pulls the other way
+                        true = math.copysign(true, number["value"])
                     if "_wave_" in key and half_a_turn_on(answer["values"], numbers_of(f)):
                         true = -true
                     # A component that is nearly nothing is held against the largest of its vector.

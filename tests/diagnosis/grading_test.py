@@ -63,6 +63,16 @@ class Grading(unittest.TestCase):
         self.assertAlmostEqual(row["errors"][0], 0.01)
         self.assertEqual(row["covered"], [True])
 
+    def test_a_weight_on_the_other_side_that_pulls_the_other_way_is_the_same(self):
+        key = "effects.A.weight_imbalance."
+        truth = {"kind": "single", "effects": [{"name": "weight_imbalance", "place": "A", "parameters": {"torque_Nm": -20.0}}],
+                 "values": {key + "torque_Nm": -20.0, key + "angle_deg": 0.0}}
+        told = found("weight_imbalance", "A", key + "torque_Nm", 20.2, 19.9, 20.3)
+        told["parameters"].append({"key": key + "angle_deg", "value": 180.0, "low": 179, "high": 181})
+        row = grading.grade(truth, report(told), 1)
+        self.assertAlmostEqual(row["errors"][0], 0.01)
+        self.assertEqual(row["covered"], [True])
+
     def test_both_waves_of_a_straightness_turn_over_together(self):
         key = "effects.Z.straightness."
         values = {key + "first_wave_um": 2.0, key + "second_wave_um": -1.0, key + "phase_deg": 30.0}
