@@ -10,8 +10,8 @@
 namespace vcnc {
 namespace {
 
-/// Power over the noise around; drives that do not vibrate by themselves have no line of 40.
-constexpr double kLoud = 60;
+/// Power over the noise around of a line, and of one that makes such a part of all noise.
+constexpr double kLoud = 300, kClear = 60, kPartOfNoise = 0.01;
 constexpr double kFrequency = 2;
 constexpr double kAmplitude = 30;  ///< differs as much as the frequency does by kFrequency
 constexpr double kAsStrong = 3;
@@ -22,11 +22,21 @@ bool is_of_drive(const Candidate& c, std::size_t axis) {
   return c.place == kAxisNames[axis] && is_of_drive(c);
 }
 
-/// Strongest line of an axis' own signals, its position if there is one; strength 0: none.
-NoiseLine strongest(const std::vector<NoiseLine>& lines, std::size_t axis) {
+/// Strongest line of an axis' own signals that is loud beside their noise, in its position if there
+/// is one; strength 0: none.
+NoiseLine strongest(const std::vector<NoiseLine>& lines, std::size_t axis,
+                    const Evidence& evidence) {
+  const auto is_loud = [&](const NoiseLine& line) {
+    if (line.strength >= kLoud) return true;
+    const std::vector<ComparedChannel>& channels = evidence.replica().channels();
+    const auto at = std::find(channels.begin(), channels.end(), line.channel) - channels.begin();
+    const double noise = evidence.noise().channels[static_cast<std::size_t>(at)].rms;
+    return line.strength >= kClear &&
+           line.amplitude * line.amplitude / 2 > kPartOfNoise * noise * noise;
+  };
   NoiseLine best;
   for (const NoiseLine& line : lines) {
-    if (!is_of_drive(line.channel, axis) || line.strength < kLoud) continue;
+    if (!is_of_drive(line.channel, axis) || !is_loud(line)) continue;
     const bool nearer =
         line.channel.kind == SignalKind::position && best.channel.kind != SignalKind::position;
     const bool same = line.channel.kind == best.channel.kind;
@@ -65,11 +75,17 @@ class ChatterSearch {
       c.unrest = u;
       c.times = *u.rms / was;
     }
-    const NoiseLine line = strongest(evidence_.noise().lines, axis),
-                    was = strongest(healthy_.lines, axis);
+    const NoiseLine line = strongest(evidence_.noise().lines, axis, evidence_),
+                    was = strongest(healthy_.lines, axis, evidence_);
     if (line.strength > 0 && !(was.strength > 0 && line.amplitude < 2 * was.amplitude))
       c.line = line;
     if (c.has_line() || c.is_restless()) c.causes = causes_of(c);
+    // A line that is not loud is news only where the model has it as strongly.
+    if (c.has_line() && c.line.strength < kLoud &&
+        (c.causes.empty() || !c.causes.front().as_strong)) {
+      c.line = {};
+      c.causes = c.is_restless() ? causes_of(c) : std::vector<ChatterCause>{};
+    }
     return c;
   }
 
@@ -169,7 +185,7 @@ class ChatterSearch {
     std::vector<double> change = prediction[at];
     for (std::size_t k = 0; k < change.size(); ++k) change[k] -= evidence_.declared()[at][k];
     return strongest(vibrations(evidence_.record(), evidence_.partition(), channel, change),
-                     channel.axis);
+                     channel.axis, evidence_);
   }
 
   const Evidence& evidence_;
