@@ -22,27 +22,30 @@ bool is_of_drive(const Candidate& c, std::size_t axis) {
   return c.place == kAxisNames[axis] && is_of_drive(c);
 }
 
-/// Strongest line of an axis' own signals that is loud beside their noise, in its position if there
-/// is one; strength 0: none.
+/// Strongest line of an axis' own signals, its position if there is one: of the loud ones, or of
+/// those that are clear and no small part of the noise; strength 0: none.
 NoiseLine strongest(const std::vector<NoiseLine>& lines, std::size_t axis,
                     const Evidence& evidence) {
-  const auto is_loud = [&](const NoiseLine& line) {
-    if (line.strength >= kLoud) return true;
+  const auto strongest_that = [&](auto&& counts) {
+    NoiseLine best;
+    for (const NoiseLine& line : lines) {
+      if (!is_of_drive(line.channel, axis) || !counts(line)) continue;
+      const bool nearer =
+          line.channel.kind == SignalKind::position && best.channel.kind != SignalKind::position;
+      const bool same = line.channel.kind == best.channel.kind;
+      if (best.strength == 0 || nearer || (same && line.strength > best.strength)) best = line;
+    }
+    return best;
+  };
+  const NoiseLine loud = strongest_that([](const NoiseLine& l) { return l.strength >= kLoud; });
+  if (loud.strength > 0) return loud;
+  return strongest_that([&](const NoiseLine& line) {
     const std::vector<ComparedChannel>& channels = evidence.replica().channels();
     const auto at = std::find(channels.begin(), channels.end(), line.channel) - channels.begin();
     const double noise = evidence.noise().channels[static_cast<std::size_t>(at)].rms;
     return line.strength >= kClear &&
            line.amplitude * line.amplitude / 2 > kPartOfNoise * noise * noise;
-  };
-  NoiseLine best;
-  for (const NoiseLine& line : lines) {
-    if (!is_of_drive(line.channel, axis) || !is_loud(line)) continue;
-    const bool nearer =
-        line.channel.kind == SignalKind::position && best.channel.kind != SignalKind::position;
-    const bool same = line.channel.kind == best.channel.kind;
-    if (best.strength == 0 || nearer || (same && line.strength > best.strength)) best = line;
-  }
-  return best;
+  });
 }
 
 double factors(double a, double b, double base) {
