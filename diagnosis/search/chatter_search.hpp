@@ -10,6 +10,8 @@
 // declares. So of the size no more is known than that it is among those that do so, and all causes
 // are one class. They explain the vibration where the model also vibrates as strongly, within a
 // factor of three in every signal of the drive; else they are what is likely.
+// A line that is clear but not loud is told only where the model vibrates as strongly: every drive
+// hums a little.
 //
 // Play may also rattle without a line, faster than a record of 1 kHz can show, or only while the
 // axis stands, where no lap is compared. Then the drive is more restless than in the healthy run
