@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "analysis/whole_file.hpp"
+#include "apps/keep_memory.hpp"
 #include "apps/node_options.hpp"
 #include "apps/progress_line.hpp"
 #include "apps/stop_signal.hpp"
@@ -19,6 +20,7 @@
 namespace vcnc {
 
 int commission_command(const CommissionOptions& options) {
+  keep_memory();
   catch_stop_signals();
   const Record record = load_record(options.run, options.map);
   const Machine declared = declared_machine(options.model, record);

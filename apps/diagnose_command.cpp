@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "analysis/whole_file.hpp"
+#include "apps/keep_memory.hpp"
 #include "apps/node_options.hpp"
 #include "apps/page_folder.hpp"
 #include "apps/progress_line.hpp"
@@ -116,6 +117,7 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
 }  // namespace
 
 int diagnose_command(const DiagnoseOptions& options) {
+  keep_memory();
   catch_stop_signals();
   const Record record = load_record(options.run, options.map);
   const Machine declared = declared_machine(options.model, record);

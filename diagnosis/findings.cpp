@@ -433,12 +433,13 @@ class Report {
                      anything ? doubt_of(options_, found().explained(), base, now, found().rounding)
                               : doubt_of(options_),
                      options_);
-    // A law that does better than all that was named takes the names away.
-    if (anything) {
+    // A law that does better than all that was named takes the names away; it can explain all that
+    // there is at most.
+    const double named = selection_.base.held_out - found().held_out;
+    if (anything && takes_names_away(named + left, found().added.size(), named, needed)) {
       LawFit instead = selection_.law_alone
                            ? *selection_.law_alone
                            : best_law(evidence_, selection_.base, doubt_of(options_), options_);
-      const double named = selection_.base.held_out - found().held_out;
       if (instead.gain > 0.5 * (named + std::max(0.0, law.gain)) &&
           takes_names_away(instead.gain, found().added.size(), named, needed)) {
         std::string names;

@@ -225,9 +225,12 @@ std::shared_ptr<const Deflections> MachineReplica::ball_of(const Hypothesis& h,
   });
 }
 
-void MachineReplica::anchor(const Machine& machine) {
-  if (!probes_) return;
+bool MachineReplica::anchor(const Machine& machine) {
   const Hypothesis h = hypothesis_of(machine);
+  std::string print = h.ball + "|" + h.sensing;
+  if (print == anchored_) return false;
+  anchored_ = std::move(print);
+  if (!probes_) return true;
   const AxisReplays axes = axes_of(h);
   auto anchor = std::make_unique<Anchor>(h, axes);
   anchor->needs_full = needs_full_probe(h.actual);
@@ -245,6 +248,7 @@ void MachineReplica::anchor(const Machine& machine) {
   anchor_ = std::move(anchor);
   pose_memory_->clear();  // they hold what was seen from another anchor
   ball_memory_->clear();
+  return true;
 }
 
 Deflections MachineReplica::reading_of(const Hypothesis& h, const AxisReplays& axes) const {

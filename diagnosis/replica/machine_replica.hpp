@@ -60,7 +60,7 @@ class MachineReplica : public Replica {
   std::vector<std::vector<double>> rounding(const Machine& machine) const override;
 
   /// What follows is asked about machines near this one. Not while others predict.
-  void anchor(const Machine& machine) override;
+  bool anchor(const Machine& machine) override;
 
  private:
   /// Results by fingerprint, the least recently used ones forgotten.
@@ -96,6 +96,7 @@ class MachineReplica : public Replica {
   PerAxis<std::unique_ptr<Memory<WatchedReplay>>> watched_;
   std::unique_ptr<Memory<Poses>> pose_memory_;  ///< on the anchor's axes
   std::unique_ptr<Memory<Deflections>> ball_memory_;
+  std::string anchored_;                  ///< fingerprint of the machine of the anchor
   std::unique_ptr<const Anchor> anchor_;  ///< null where nothing is probed
 };
 

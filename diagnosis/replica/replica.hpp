@@ -66,8 +66,8 @@ class Replica {
   /// which no prediction has in it; empty where there is none.
   virtual std::vector<std::vector<double>> rounding(const Machine&) const { return {}; }
   /// What follows is asked about machines near this one: a replica may be exact here and quicker
-  /// elsewhere. Not while others predict.
-  virtual void anchor(const Machine&) {}
+  /// elsewhere. False: it was here already, and predicts what it did. Not while others predict.
+  virtual bool anchor(const Machine&) { return true; }
 };
 
 }  // namespace vcnc

@@ -74,11 +74,14 @@ ReplicaOfChange::ReplicaOfChange(Replica& replica, const Machine& healthy,
   at_healthy_ = derivatives(healthy, all);
 }
 
-void ReplicaOfChange::anchor(const Machine& machine) {
+bool ReplicaOfChange::anchor(const Machine& machine) {
   anchor_ = without_common(machine);
-  replica_.anchor(anchor_);
-  of_change_.assign(common_.size(), {});
-  latest_.clear();
+  const bool moved = replica_.anchor(anchor_);
+  if (moved || of_change_.empty()) {
+    of_change_.assign(common_.size(), {});
+    latest_.clear();
+  }
+  return moved;
 }
 
 Prediction ReplicaOfChange::predict(const Machine& hypothesis) const {

@@ -48,7 +48,7 @@ class ReplicaOfChange final : public Replica {
   std::vector<std::vector<double>> rounding(const Machine& declared) const override {
     return replica_.rounding(declared);
   }
-  void anchor(const Machine& machine) override;
+  bool anchor(const Machine& machine) override;
 
  private:
   /// What a prediction became, so that those that share a series still do afterwards.

@@ -402,7 +402,10 @@ class Askew : public Replica {
     }
     return all;
   }
-  void anchor(const Machine& m) override { anchor_ = m; }
+  bool anchor(const Machine& m) override {
+    anchor_ = m;
+    return true;
+  }
 
  private:
   toy::ToyReplica toy_;

@@ -108,7 +108,8 @@ TEST(MachineReplica, IsFullAtItsAnchor) {
   EXPECT_TRUE(same_bits(replica.predict(run.declared), replica.predict_in_full(run.declared)));
   EXPECT_FALSE(
       same_bits(replica.predict(run.true_machine), replica.predict_in_full(run.true_machine)));
-  replica.anchor(run.true_machine);
+  EXPECT_FALSE(replica.anchor(run.declared));
+  EXPECT_TRUE(replica.anchor(run.true_machine));
   EXPECT_TRUE(
       same_bits(replica.predict(run.true_machine), replica.predict_in_full(run.true_machine)));
 }
