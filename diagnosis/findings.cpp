@@ -531,6 +531,7 @@ class Report {
     const double ratio = 1 + after / std::max(1.0, floor_);
     const bool named = !d_.effects.empty();
     d_.explained_share = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
+    d_.left = ratio < kQuiet ? 0 : std::sqrt(ratio);
     const bool excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),
                                      [](const Excitation& e) { return e.excited; });
     using enum DiagnosisVerdict;

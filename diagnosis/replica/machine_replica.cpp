@@ -232,12 +232,19 @@ bool MachineReplica::anchor(const Machine& machine) {
   anchored_ = std::move(print);
   if (!probes_) return true;
   const AxisReplays axes = axes_of(h);
-  auto anchor = std::make_unique<Anchor>(h, axes);
+  std::unique_ptr<Anchor> anchor;
+  ProbeReplay full;
+  Deflections quick;
+  parallel_for(2, [&](std::size_t i) {
+    if (i == 0) {
+      full = replay_probe(h.actual, piece_.get(), axes);
+      return;
+    }
+    anchor = std::make_unique<Anchor>(h, axes);
+    quick = replay_contact(h.actual, piece_.get(),
+                           {anchor->poses, anchor->poses.poses(), anchor->poses.axes()});
+  });
   anchor->needs_full = needs_full_probe(h.actual);
-  anchor->full = replay_probe(h.actual, piece_.get(), axes);
-  const Deflections quick = replay_contact(
-      h.actual, piece_.get(), {anchor->poses, anchor->poses.poses(), anchor->poses.axes()});
-  const ProbeReplay& full = anchor->full;
   anchor->off_record = off_record(full.reading);
   anchor->ball_offset = sum(full.ball, quick, -1);
   anchor->reading_offset = sum(full.reading, replay_sensing(h.actual, full.ball, axes), -1);
@@ -245,6 +252,7 @@ bool MachineReplica::anchor(const Machine& machine) {
                         ? sum(replay_sensing(h.actual, full.ball, axes, &anchor->off_record),
                               anchor->reading_offset, 1)
                         : full.reading;
+  anchor->full = std::move(full);
   anchor_ = std::move(anchor);
   pose_memory_->clear();  // they hold what was seen from another anchor
   ball_memory_->clear();

@@ -75,6 +75,7 @@ struct Diagnosis {
   DiagnosisVerdict verdict = DiagnosisVerdict::no_deviation;
   bool differential = false;  ///< against a healthy reference run
   double explained_share = 0, model_form_share = 0;
+  double left = 0;  ///< RMS in units of the noise, of all signals; 0: no more than noise
   std::vector<FoundEffect> effects;  ///< by what they do to the contour error
   std::optional<LearnedLaw> law;
   std::vector<std::string> vibrations;  ///< "X vibrates by itself at 83 Hz", of unknown cause

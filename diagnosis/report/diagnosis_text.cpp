@@ -39,6 +39,11 @@ std::string with_interval(const FittedNumber& n) {
 std::string verdict_sentence(const Diagnosis& d) {
   switch (d.verdict) {
     case DiagnosisVerdict::explained:
+      if (d.left > 0)
+        return fmt::format(
+            "what was added explains {:.1f} % of what was to be explained and leaves {:.2f} times "
+            "the noise",
+            d.explained_share * 100, d.left);
       return !d.differential && !d.declared.commissioned.empty()
                  ? "what was added leaves no more than noise and what commissioning left"
                  : "what was added leaves nothing but noise";

@@ -63,6 +63,14 @@ TEST(DiagnosisJson, HoldsAllThatWasFoundInTheUnitsOfItsNames) {
 }
 
 TEST(DiagnosisText, BeginsWithTheVerdictAndHasNumbersWithIntervals) {
+  Diagnosis d = found_backlash();
+  d.verdict = DiagnosisVerdict::explained;
+  EXPECT_EQ(verdict_sentence(d), "what was added leaves nothing but noise");
+  d.explained_share = 0.9934;
+  d.left = 1.66;
+  EXPECT_EQ(verdict_sentence(d),
+            "what was added explains 99.3 % of what was to be explained and leaves 1.66 times the "
+            "noise");
   const std::string text = to_text(found_backlash());
   EXPECT_EQ(text.find("PARTLY: what was added explains 87 %"), 0u) << text;
   for (const char* part :
