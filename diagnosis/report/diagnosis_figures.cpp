@@ -220,8 +220,9 @@ std::string correlation_figure(const RelatedQuantity& covariate, const ComparedC
   const ShownUnit unit = shown_unit(channel);
   const BinnedMeans b = binned(covariate, before), a = binned(covariate, after);
   std::string text =
-      heading(900, 300) + margins(kUnder, 0.93) + means_block("up", b, 0, unit.factor) +
-      means_block("down", b, kBins, unit.factor) + means_block("after_up", a, 0, unit.factor) +
+      heading(900, 300) + margins(kUnder, 0.88) + "set key at graph 1,graph 1.17 noopaque\n" +
+      means_block("up", b, 0, unit.factor) + means_block("down", b, kBins, unit.factor) +
+      means_block("after_up", a, 0, unit.factor) +
       means_block("after_down", a, kBins, unit.factor) +
       fmt::format("set xlabel '{} [{}]'\nset ylabel '{} [{}]' offset 0.5\n",
                   quoted_label(covariate.name), covariate.unit, channel_name(channel), unit.name);

@@ -106,14 +106,14 @@ std::string figures_section(const std::vector<SignalFigure>& figures) {
   for (const SignalFigure& f : figures) {
     // Of a signal that is not there, rounding is all that is left.
     if (std::max(f.before, f.after) < 1e-3 * f.floor) continue;
-    const bool moved = std::abs(f.after - f.before) > 0.05 * f.before;
+    const bool moved = std::abs(f.after - f.before) > 0.05 * std::max(f.before, f.floor);
     (moved ? changed : same) += figure_row(f);
     unchanged += !moved;
   }
   std::string text = changed.empty() ? "" : head + changed + "</table>\n";
   if (unchanged > 0)
     text += fmt::format(
-        "<details{}><summary>{} within 5 % of what {} before</summary>\n{}{}"
+        "<details{}><summary>{} within 5 % of what {} before, or of the noise</summary>\n{}{}"
         "</table></details>\n",
         changed.empty() ? " open" : "",
         unchanged == 1 ? "one row" : fmt::format("{} rows", unchanged),
