@@ -4,7 +4,7 @@
 namespace vcnc {
 
 /// What is freed is kept for the next series, and threads that live for milliseconds share it, as
-/// giving it back and clearing it again took a tenth of a diagnosis. Before any thread begins.
+/// giving it back and clearing it again took 6 % of a diagnosis. Before any thread begins.
 void keep_memory();
 
 }  // namespace vcnc

@@ -229,8 +229,10 @@ bool MachineReplica::anchor(const Machine& machine) {
   const Hypothesis h = hypothesis_of(machine);
   std::string print = h.ball + "|" + h.sensing;
   if (print == anchored_) return false;
-  anchored_ = std::move(print);
-  if (!probes_) return true;
+  if (!probes_) {
+    anchored_ = std::move(print);
+    return true;
+  }
   const AxisReplays axes = axes_of(h);
   std::unique_ptr<Anchor> anchor;
   ProbeReplay full;
@@ -254,6 +256,7 @@ bool MachineReplica::anchor(const Machine& machine) {
                         : full.reading;
   anchor->full = std::move(full);
   anchor_ = std::move(anchor);
+  anchored_ = std::move(print);
   pose_memory_->clear();  // they hold what was seen from another anchor
   ball_memory_->clear();
   return true;
