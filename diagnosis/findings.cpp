@@ -518,10 +518,10 @@ class Report {
   }
 
   void judge() {
+    const auto of_setup = [](const FoundEffect& e) { return e.place == "setup"; };
     // What is no part of the search was explained before it began.
     const bool beforehand =
-        before_.slip || std::any_of(d_.effects.begin(), d_.effects.end(),
-                                    [](const auto& e) { return e.place == "setup"; });
+        before_.slip || std::any_of(d_.effects.begin(), d_.effects.end(), of_setup);
     const double before =
         excess(beforehand ? evidence_.chi2(evidence_.residual(evidence_.predict(of_.declared)),
                                            Role::held_out)
@@ -529,7 +529,8 @@ class Report {
     const FittedMachine& kept = withdrawn_ ? selection_.base : found();
     const double after = excess(kept.held_out);
     const double ratio = 1 + after / std::max(1.0, floor_);
-    const bool named = !d_.effects.empty();
+    // A piece that lies elsewhere is no fault of the machine.
+    const bool named = !std::all_of(d_.effects.begin(), d_.effects.end(), of_setup);
     d_.explained_share = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
     d_.left = ratio < kQuiet ? 0 : std::sqrt(ratio);
     const bool excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),

@@ -60,7 +60,8 @@ std::string verdict_sentence(const Diagnosis& d) {
       if (!d.vibrations.empty()) return fmt::to_string(fmt::join(d.vibrations, ", "));
       return "something is there that nothing in the library explains";
     case DiagnosisVerdict::no_deviation:
-      return "the machine does what is declared, within what this run can show";
+      return std::string("the machine does what is declared, within what this run can show") +
+             (d.effects.empty() ? "" : "; the piece is not where it is declared");
     case DiagnosisVerdict::not_identifiable:
       return "the run does not excite what it should tell";
   }

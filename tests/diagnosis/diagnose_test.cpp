@@ -401,11 +401,12 @@ TEST(Diagnose, WhatCommissioningLeftNeedsNoCause) {
   EXPECT_THROW(diagnosed(well, fitted), InputError);
 }
 
-TEST(Diagnose, WhereThePieceWasClampedIsExplained) {
+TEST(Diagnose, WhereThePieceWasClampedIsToldAndIsNoFaultOfTheMachine) {
   Machine clamped;
   move_number(clamped, "effects.setup.piece_offset.shift_um.x", 40);
   const Diagnosis d = diagnosed(measured(clamped, 47));
-  EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::no_deviation);
+  EXPECT_NE(verdict_sentence(d).find("not where it is declared"), std::string::npos);
   ASSERT_EQ(d.effects.size(), 1U);
   EXPECT_EQ(d.effects[0].name, "piece_offset");
   EXPECT_GT(d.explained_share, 0.99);
