@@ -102,9 +102,12 @@ std::vector<Contender> Contest::contenders() {
     finish(all);
   }
   for (Contender& c : releases(Released::where_pulled)) all.push_back(std::move(c));
-  for (Contender& c : all) c.needed = needed_of(c);
+  for (Contender& c : all) {
+    c.needed = needed_of(c);
+    c.counts = counts(c.gain, c.fit.held_out_of);
+  }
   std::erase_if(all, [&](const Contender& c) {
-    return c.gain <= c.needed || counts(c.gain, c.fit.held_out_of) <= c.needed ||
+    return c.gain <= c.needed || c.counts <= c.needed ||
            !rules_.stands_out(ground_.held_out_of, c.fit.held_out_of) ||
            (c.released.empty() && !under_two_conditions(c));
   });
@@ -127,6 +130,7 @@ std::vector<Contender> Contest::rivals(double least, std::size_t but) const {
   finish(all);
   for (Contender& c : releases(Released::anywhere))
     if (c.gain >= least) all.push_back(std::move(c));
+  for (Contender& c : all) c.counts = counts(c.gain, c.fit.held_out_of);
   sort_by_worth(all);
   return all;
 }
@@ -144,11 +148,11 @@ std::vector<std::size_t> Contest::equivalents(const std::vector<Contender>& cont
   std::vector<std::size_t> all;
   const auto most =
       std::max_element(contenders.begin(), contenders.end(),
-                       [](const Contender& x, const Contender& y) { return x.gain < y.gain; });
+                       [](const Contender& x, const Contender& y) { return x.counts < y.counts; });
   const double band = band_of(most->gain);
   for (std::size_t i = 1; i < contenders.size(); ++i)
-    if (contenders[i].released.empty() && contenders[i].gain > most->gain - band &&
-        contenders[i].gain > 0.5 * most->gain)
+    if (contenders[i].released.empty() && contenders[i].counts > most->counts - band &&
+        contenders[i].counts > 0.5 * most->counts)
       all.push_back(contenders[i].candidate);
   return all;
 }
@@ -224,20 +228,20 @@ std::vector<Screened> Contest::likes_of(const std::vector<Contender>& all,
 /// the typical one.
 void Contest::put_simplest_first(std::vector<Contender>& all) const {
   if (all.empty()) return;
-  const double most = all.front().gain, band = band_of(most);
+  const double most = all.front().counts, band = band_of(all.front().gain);
   // A number that is never quite absent is one of an effect: where that does as well with all its
   // numbers, it is told, so that what is known of one of them does not hang on the others'
   // defaults.
   std::set<std::string> owned;
   for (const Contender& e : all)
     for (const FreedNumber& n : e.numbers)
-      if (e.released.empty() && e.gain > most - band) owned.insert(n.number.key);
+      if (e.released.empty() && e.counts > most - band) owned.insert(n.number.key);
   std::erase_if(all, [&](const Contender& c) { return owned.contains(c.released); });
-  // A gain that is less by the band weighs like one number more.
-  const auto cost = [&](const Contender& c) { return intricacy(c) + (most - c.gain) / band; };
+  // What counts less by the band weighs like one number more.
+  const auto cost = [&](const Contender& c) { return intricacy(c) + (most - c.counts) / band; };
   auto simplest = all.begin();
   for (auto c = all.begin(); c != all.end(); ++c)
-    if (c->gain > most - band && cost(*c) < cost(*simplest)) simplest = c;
+    if (c->counts > most - band && cost(*c) < cost(*simplest)) simplest = c;
   std::rotate(all.begin(), simplest, simplest + 1);
 }
 
@@ -324,6 +328,7 @@ void Contest::begin_elsewhere(Contender& best, const std::vector<Screened>& tria
     others.back().needed = needed_of(others.back());
   }
   finish(others);
+  for (Contender& c : others) c.counts = counts(c.gain, c.fit.held_out_of);
   for (Contender& c : others)
     if (c.fit.fitted < best.fit.fitted && c.gain > best.gain) best = std::move(c);
 }
@@ -427,7 +432,7 @@ void Contest::look_ahead(const std::vector<Screened>& screened, std::vector<Cont
       std::max_element(together.begin(), together.end(),
                        [](const Screened& x, const Screened& y) { return x.counted < y.counted; });
   const auto [one, other] = pairs[static_cast<std::size_t>(best - together.begin())];
-  const double single = all.empty() ? 0 : all.front().gain;
+  const double single = all.empty() ? 0 : all.front().counts;
   const double least =
       std::max(rules_.threshold(ground_.held_out), 0.1 * rules_.excess(ground_.held_out));
   // One that does nothing beside another makes no pair of it.
@@ -435,8 +440,8 @@ void Contest::look_ahead(const std::vector<Screened>& screened, std::vector<Cont
   if (best->counted < std::max(single, either) + least) return;
   Contender c = contender({best->trial, screened[other].trial}, best->size, best->gain);
   c.needed = needed_of({c.candidate, candidate_of(screened[other])}, c.fit.held_out_of);
-  if (counts(c.gain, c.fit.held_out_of) > single + least &&
-      rules_.stands_out(ground_.held_out_of, c.fit.held_out_of))
+  c.counts = counts(c.gain, c.fit.held_out_of);
+  if (c.counts > single + least && rules_.stands_out(ground_.held_out_of, c.fit.held_out_of))
     all.insert(all.begin(), std::move(c));
 }
 

@@ -24,12 +24,13 @@ struct Contender {
   std::vector<FreedNumber> numbers;
   Refit fit;
   double gain = 0;
+  double counts = 0;     ///< what of the gain counts (counted_gain.hpp)
   std::string released;  ///< key of a declared number whose tolerance is lifted; else empty
   double needed = 0;     ///< what it must gain to be told
   bool converged = false;
 
-  /// Gain less what further numbers give by chance.
-  double worth() const { return gain - 4 * static_cast<double>(numbers.size()); }
+  /// What counts less what further numbers give by chance.
+  double worth() const { return counts - 4 * static_cast<double>(numbers.size()); }
 };
 
 /// What every contest of a diagnosis has in common.

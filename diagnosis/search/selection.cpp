@@ -132,7 +132,7 @@ class Search {
           fitted_with(now, contenders[i],
                       i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
       if (now.held_out - trial.held_out > contenders[i].needed) {
-        now = best_of_as_good(now, std::move(trial), contenders, i);
+        now = best_of_as_good(now, std::move(trial), contenders, i, contest);
         return true;
       }
       evidence_.anchor(now.machine);
@@ -143,7 +143,8 @@ class Search {
   /// `trial`, which has the contender `than`, or one of those that did as well, if it clearly does
   /// better when all is fitted.
   FittedMachine best_of_as_good(const FittedMachine& now, FittedMachine trial,
-                                const std::vector<Contender>& contenders, std::size_t than) {
+                                const std::vector<Contender>& contenders, std::size_t than,
+                                const Contest& contest) {
     std::size_t numbers = contenders[than].numbers.size();
     const bool leaves = rules_.excess(trial.held_out) > options_.least_gain;
     for (const Contender* other : as_good(contenders, than, leaves)) {
@@ -153,12 +154,18 @@ class Search {
       const bool of_one_kind = other->released.empty() == contenders[than].released.empty();
       const double clearly = std::max(more * options_.class_gain,
                                       of_one_kind ? kHalf * rules_.excess(trial.held_out) : 0);
-      if (instead.held_out + clearly > trial.held_out) continue;
+      if (counted(instead, contest) < counted(trial, contest) + clearly) continue;
       trial = std::move(instead);
       numbers = other->numbers.size();
     }
     evidence_.anchor(trial.machine);
     return trial;
+  }
+
+  /// What counts of the gain of a machine that came out of a contest.
+  double counted(const FittedMachine& m, const Contest& contest) const {
+    return contest.counts(contest.held_out() - m.held_out,
+                          Ground(evidence_, m.residual, m.linear()).held_out_of);
   }
 
   /// With a contender, everything fitted together.
@@ -180,7 +187,7 @@ class Search {
     const Contender& best = contenders[than];
     std::vector<const Contender*> all;
     for (std::size_t i = than + 1; i < contenders.size() && all.size() < kAttempts; ++i)
-      if (contenders[i].gain > kAsGood * best.gain &&
+      if (contenders[i].counts > kAsGood * best.counts &&
           (leaves || contenders[i].released.empty() != best.released.empty()))
         all.push_back(&contenders[i]);
     return all;
@@ -376,15 +383,13 @@ class Search {
       for (const Contender& r : rivals)
         if (r.released.empty() && r.gain > std::max(lost - contest.band_of(lost), 0.5 * lost))
           alike.push_back(r.candidate);
-      const double worth = lost - 4 * static_cast<double>(effect ? effect->numbers.size() : 1),
-                   counts =
-                       contest.counts(lost, Ground(evidence_, m.residual, m.linear()).held_out_of);
+      const double worth =
+          counted(m, contest) - 4 * static_cast<double>(effect ? effect->numbers.size() : 1);
       const auto simpler = [&](const Contender& r) {
         return effect && contest.says_it_simpler(r, *effect, lost);
       };
       const auto better = std::find_if(rivals.begin(), rivals.end(), [&](const Contender& r) {
-        return simpler(r) ||
-               (r.worth() >= worth && contest.counts(r.gain, r.fit.held_out_of) >= counts);
+        return simpler(r) || r.worth() >= worth;
       });
       if (better == rivals.end()) {
         ++i;
@@ -392,7 +397,7 @@ class Search {
       }
       const double allowed_loss = simpler(*better) ? contest.band_of(lost) : -options_.least_gain;
       add(less, *better, {});
-      if (less.held_out > m.held_out + allowed_loss) {
+      if (counted(less, contest) < counted(m, contest) - allowed_loss) {
         evidence_.anchor(m.machine);
         ++i;
         continue;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/search/differential.hpp"
@@ -66,6 +67,40 @@ TEST(CommonNumbers, AreWhatHasATolerance) {
   EXPECT_DOUBLE_EQ(of("effects.Y.presliding.stiffness_N_per_um"), 15);
   EXPECT_EQ(of("effects.X.presliding.stiffness_N_per_um"), 0);
   for (const FreedNumber& n : all) EXPECT_TRUE(n.common());
+}
+
+/// Counts what it is asked, and knows where it stands.
+class CountingReplica : public ProductReplica {
+ public:
+  Prediction predict(const Machine& m) const override {
+    ++asked;
+    return ProductReplica::predict(m);
+  }
+  bool anchor(const Machine& m) override {
+    const double now = m.effects.get<Squareness>().xy;
+    return std::exchange(at_, now) != now;
+  }
+  mutable int asked = 0;
+
+ private:
+  double at_ = std::nan("");
+};
+
+TEST(CommonNumbers, AreDerivedAnewOnlyWhereTheReplicaHasMoved) {
+  CountingReplica inner;
+  ReplicaOfChange replica(inner, machine(0.3, 0), damping_alone());
+  const auto asked = [&](double squareness) {
+    const int before = inner.asked;
+    replica.predict(machine(0.3, squareness, 0.2));
+    return inner.asked - before;
+  };
+  replica.anchor(machine(0.3, 0.2));
+  EXPECT_EQ(asked(0.2), 3);  // where it stands, and there with the number moved
+  EXPECT_EQ(asked(0.2), 1);
+  replica.anchor(machine(0.3, 0.2));
+  EXPECT_EQ(asked(0.2), 1);
+  replica.anchor(machine(0.3, 0.4));
+  EXPECT_EQ(asked(0.4), 3);
 }
 
 TEST(CommonNumbers, DoNothingAtTheHealthyMachineAndMultiplyWithAChange) {

@@ -344,6 +344,87 @@ TEST(Selection, RivalsHaveTheCommonNumbersOfTheOneInPlace) {
   EXPECT_NEAR(number_of(result.found.machine, sixth), 1, 0.01);
 }
 
+/// The readings of two replicas.
+class TwoReadings : public Replica {
+ public:
+  TwoReadings(const Replica& x, const Replica& y)
+      : x_(x), y_(y), channels_{{SignalKind::deflection, 0}, {SignalKind::deflection, 1}} {}
+
+  const std::vector<ComparedChannel>& channels() const override { return channels_; }
+  Prediction predict(const Machine& m) const override {
+    return {x_.predict(m)[0], y_.predict(m)[0]};
+  }
+
+ private:
+  const Replica &x_, &y_;
+  std::vector<ComparedChannel> channels_;
+};
+
+TEST(Selection, WhatTheModelsFormMayBeDoesNotRank) {
+  // All of x is "right". What is in y is of the model's form, and "wrong" takes it for its own:
+  // with most of x it gains more.
+  const char *right = "effects.X.load_play.width_um", *wrong = "effects.X.backlash.gap_um";
+  Record record = toy::commands(1000, 4);
+  const WaveReplica x(record.samples(), {{right, {1, 0}}, {wrong, {1, 0.3}}}),
+      y(record.samples(), {{wrong, {1}}});
+  TwoReadings replica(x, y);
+  const Machine truth = toy::machine({{right, 1}});
+  for (std::size_t c = 0; c < 2; ++c) {
+    std::vector<double> reading = replica.predict(truth)[c];
+    for (std::size_t k = 0; k < reading.size(); ++k)
+      reading[k] += toy::kProbeNoise * gaussian_noise(21, c, k)[0] +
+                    (c == 1 ? 1e-6 : 0) * std::sin(2 * kPi * 3 * static_cast<double>(k) / 1000);
+    record.signals.push_back({SignalKind::deflection, c, "", reading, 0});
+  }
+  for (const bool known : {false, true}) {
+    Evidence evidence(record, replica, {});
+    DiagnosisOptions options;
+    options.max_effects = 1;
+    if (known) options.form_of_channel = {0, 100 * evidence.count(1, Role::held_out)};
+    options.taken_of_form = 1;
+    const SelectionResult result = select_effects_of(evidence, {}, x.candidates(), options, {});
+    ASSERT_FALSE(result.ladder.empty());
+    EXPECT_EQ(result.ladder.front().name, known ? right : wrong);
+    EXPECT_EQ(result.found.added.size(), 1U);
+    EXPECT_NEAR(number_of(result.found.machine, right), known ? 1 : 0, 0.02);
+  }
+}
+
+/// The effect on X has as much of the fourth wave besides as the mass is off, in 10 kg. Without it
+/// the mass does next to nothing.
+class MassTurnsX : public WaveReplica {
+ public:
+  using WaveReplica::WaveReplica;
+  static constexpr const char* kOnX = "effects.X.load_play.width_um";
+
+  Prediction predict(const Machine& m) const override {
+    const Prediction waves = WaveReplica::predict(m);
+    const double off = number_of(m, WavesAndMass::kMass) - number_of({}, WavesAndMass::kMass),
+                 um = number_of(m, kOnX) * off / 10;
+    std::vector<double> x = waves[0];
+    for (std::size_t k = 0; k < x.size(); ++k)
+      x[k] += 1e-6 * um * std::sin(2 * kPi * 4 * static_cast<double>(k) / 1000) +
+              1e-10 * off * std::sin(2 * kPi * 9 * static_cast<double>(k) / 1000);
+    return {x};
+  }
+};
+
+TEST(Selection, OfThoseThatDoAsWellTheOneIsTakenThatDoesBestWhenAllIsFitted) {
+  // Alone, "imitation" explains more: what the mass does shows only where the effect is.
+  const char* imitation = "effects.Y.load_play.width_um";
+  Record record = toy::commands(1000, 4);
+  MassTurnsX replica(record.samples(), {{MassTurnsX::kOnX, {1}}, {imitation, {1, 0.03}}});
+  const Machine truth = toy::machine({{MassTurnsX::kOnX, 3}, {WavesAndMass::kMass, 500.6}});
+  read(record, replica, truth, 22);
+  Evidence evidence(record, replica, {});
+  std::vector<Candidate> all = replica.candidates();
+  for (Candidate& c : all) c.family = Family::mechanics, c.place = "X";
+  const SelectionResult result = select_effects_of(evidence, {}, all, {}, {});
+  EXPECT_EQ(names(result, all), std::string("X.") + MassTurnsX::kOnX);
+  EXPECT_NEAR(number_of(result.found.machine, MassTurnsX::kOnX), 3, 0.02);
+  EXPECT_NEAR(number_of(result.found.machine, WavesAndMass::kMass), 500.6, 0.1);
+}
+
 TEST(Selection, BesideAnotherOfItsDriveAnEffectMustExplainMoreOfWhatIsLeft) {
   // The machine is the first and the second wave, and one that nothing explains.
   Record record = toy::commands(1000, 4);
