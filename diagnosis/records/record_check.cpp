@@ -22,6 +22,7 @@ constexpr double kSmoothing = 10e-3;  ///< [s] of all derivatives here
 constexpr double kBelongs = 0.7;      ///< correlation of what belongs together
 constexpr double kFits = 0.95;        ///< ... of what certainly does
 constexpr double kSlope = 0.1;        ///< how far a slope may be off 1
+constexpr double kLead = 2e-3;        ///< [s] that no feed-forward makes by itself
 constexpr std::size_t kFewestSteps = 500;
 
 struct Spread {
@@ -252,7 +253,7 @@ class Checker {
     if (r.correlation < -kBelongs)
       refuse(fmt::format("{} moves against {}; check the signs", name(s), name(*own)));
     if (r.correlation >= kBelongs) {
-      if (std::abs(r.slope - 1) <= 2 * kSlope) return;
+      if (std::abs(r.slope - 1) <= 2 * kSlope) return check_order(s, *own);
       const std::string found = fmt::format("{} moves {:.4g} times as far as {}{}", name(s),
                                             r.slope, name(*own), mistake(r.slope));
       if (r.slope > 0.5 && r.slope < 1.9)
@@ -269,6 +270,19 @@ class Checker {
     }
     warn(fmt::format("{} hardly follows {} (correlation of their speeds {:.2f})", name(s),
                      name(*own), r.correlation));
+  }
+
+  /// A position comes after its command.
+  void check_order(const MeasuredSignal& s, const MeasuredSignal& command) {
+    Series ahead = s.value;
+    for (std::size_t k = 0; k < ahead.size(); ++k) ahead[k] -= command.value[k];
+    const Relation r = relate(speed_of(command), smoothed(ahead, half_));
+    if (!r.known || r.correlation < kBelongs || r.slope < std::max(kLead, 2 * record_.period))
+      return;
+    warn(
+        fmt::format("{} is ahead of {} by {:.3g} ms: swapped columns, other time stamps, or far "
+                    "too much feed-forward",
+                    name(s), name(command), 1e3 * r.slope));
   }
 
   void check_range(const MeasuredSignal& s) {

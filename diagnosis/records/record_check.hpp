@@ -7,7 +7,8 @@
 //
 //   velocity    regression of the velocity signal on the derivative of the position: the slope must
 //               be 1 within 10 %, the correlation above 0.7
-//   command     correlation of the position's steps with those of every axis' command
+//   command     correlation of the position's steps with those of every axis' command; the slope of
+//               what it is ahead over the command's velocity: 2 ms at most
 //   force       least squares F = M a + B v + C sgn(v) + D (band-limited): M against the declared
 //               mass, the share that is explained, the sign
 //   range       positions against the declared travel, speeds against the declared limit

@@ -296,6 +296,9 @@ TEST(ImportTable, WarnsOfWhatIsOnlySuspicious) {
   const Record outside = with(
       "pos", [](double t) { return 0.1 + LinearAxis::position(t - 0.004); }, sound_map());
   EXPECT_TRUE(warned(outside, "outside the declared travel")) << all_warnings(outside);
+  const Record swapped =
+      imported(kTime + signal("pos", "command", "X", "m") + signal("cmd", "position", "X", "m"));
+  EXPECT_TRUE(warned(swapped, "is ahead of \"pos\" (command X) by 4 ms")) << all_warnings(swapped);
 }
 
 TEST(Resolution, IsTheStepOfQuantisedValuesAndNothingOfSmoothOnes) {
