@@ -15,6 +15,7 @@
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/records/any_record.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
+#include "diagnosis/replica/readings_check.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
 
 namespace vcnc {
@@ -28,6 +29,7 @@ int commission_command(const CommissionOptions& options) {
   if (!options.model.empty() && std::filesystem::equivalent(options.model, options.out, error))
     throw InputError("--out " + options.out + ": is the declared machine itself");
   MachineReplica replica(record, declared, piece_of(declared, record));
+  check_readings(record, replica.channels(), replica.predict(declared));
   if (replica.channels().empty())
     throw InputError(record.source + ": holds nothing that can be predicted");
   ProgressLine progress;

@@ -17,6 +17,7 @@
 #include "diagnosis/quadrature.hpp"
 #include "diagnosis/records/any_record.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
+#include "diagnosis/replica/readings_check.hpp"
 #include "diagnosis/report/diagnosis_json.hpp"
 #include "diagnosis/report/diagnosis_page.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
@@ -36,6 +37,7 @@ std::unique_ptr<MachineReplica> replica_of(const Record& record, const Machine& 
     throw InputError(record.source +
                      ": holds nothing that can be predicted: a position, twist or force needs the "
                      "command or a position of its axis, a deflection those of all axes");
+  check_readings(record, replica->channels(), replica->predict(declared));
   return replica;
 }
 

@@ -1,0 +1,58 @@
+#include "diagnosis/replica/readings_check.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+
+#include "diagnosis/records/measured_table.hpp"
+#include "diagnosis/records/signal_name.hpp"
+
+namespace vcnc {
+namespace {
+
+constexpr double kIs = 0.95, kMayBe = 0.7;  // correlations
+
+double correlation(const std::vector<double>& x, const std::vector<double>& y) {
+  double n = 0, sx = 0, sy = 0, xx = 0, yy = 0, xy = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    if (!std::isfinite(x[k]) || !std::isfinite(y[k])) continue;
+    ++n, sx += x[k], sy += y[k], xx += x[k] * x[k], yy += y[k] * y[k], xy += x[k] * y[k];
+  }
+  const double square = (n * xx - sx * sx) * (n * yy - sy * sy);
+  return square > 0 ? (n * xy - sx * sy) / std::sqrt(square) : 0;
+}
+
+std::string name(const MeasuredSignal& s) {
+  return fmt::format("\"{}\" ({})", s.source, signal_name(s.kind, s.axis));
+}
+
+}  // namespace
+
+void check_readings(const Record& record, const std::vector<ComparedChannel>& channels,
+                    const Prediction& predicted) {
+  struct Reading {
+    const MeasuredSignal* measured;
+    const std::vector<double>& predicted;
+  };
+  std::vector<Reading> readings;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    const auto& [kind, axis] = channels[c];
+    const MeasuredSignal* s = record.find(kind, axis);
+    if (!s || (kind != SignalKind::deflection && kind != SignalKind::twist)) continue;
+    if (correlation(s->value, predicted[c]) < -kIs)
+      throw MeasurementError(fmt::format(
+          "{}: {} goes against what the machine does; check its sign", record.source, name(*s)));
+    if (kind == SignalKind::deflection) readings.push_back({s, predicted[c]});
+  }
+  const auto alike = [](const Reading& read, const Reading& as) {
+    return correlation(read.measured->value, as.predicted);
+  };
+  for (const Reading& a : readings)
+    for (const Reading& b : readings)
+      if (alike(a, b) > kIs && alike(a, a) < kMayBe && alike(b, b) < kMayBe)
+        throw MeasurementError(fmt::format("{}: {} is what {} would be: the columns are swapped",
+                                           record.source, name(*a.measured), name(*b.measured)));
+}
+
+}  // namespace vcnc
