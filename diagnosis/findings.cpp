@@ -24,6 +24,8 @@ namespace {
 constexpr double kQuiet = 1.05, kAllExplained = 0.98;
 /// Part of the noise's chi-square that no law is sought in.
 constexpr double kFloorScatter = 0.04;
+/// Times the noise of a sample by which readings may shift from lap to lap.
+constexpr double kShifted = 3;
 const EffectText* text_of(const std::string& effect) {
   const EffectText* text = nullptr;
   for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
@@ -95,6 +97,7 @@ class Report {
     tell_events();
     if (!selection_.interrupted) tell_law();
     tell_chatter();
+    tell_shifts_between_laps();
     std::stable_sort(d_.effects.begin(), d_.effects.end(), [](const auto& a, const auto& b) {
       return a.contour_error_um > b.contour_error_um;
     });
@@ -110,6 +113,8 @@ class Report {
  private:
   const FittedMachine& found() const { return selection_.found; }
   double excess(double held_out) const { return std::max(0.0, held_out - floor_); }
+
+  static bool is_of_machine(const FoundEffect& e) { return e.place != "setup"; }
 
   static std::string name_of(const FoundEffect& e) {
     return e.name == "deviation" ? e.place : e.place + "." + e.name;
@@ -397,6 +402,26 @@ class Report {
     }
   }
 
+  /// Readings that are elsewhere in every lap: noise to a fit, but more than samples have.
+  void tell_shifts_between_laps() {
+    if (selection_.interrupted) return;
+    const bool named = std::any_of(d_.effects.begin(), d_.effects.end(), is_of_machine);
+    const Prediction left = evidence_.predict(d_.found);
+    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      if (channels[c].kind != SignalKind::deflection) continue;
+      const double shift = shift_between_laps(evidence_, left, c).value_or(0),
+                   noise = evidence_.noise().channels[c].rms;
+      if (shift < kShifted * noise) continue;
+      const std::string text = fmt::format("{} shifts by {:.2g} um from lap to lap",
+                                           channel_name(channels[c]), 1e6 * shift);
+      d_.notes.push_back(fmt::format(
+          "{}, {:.0f} times the noise of a sample, as with a clamp that slips or a drift.", text,
+          shift / noise));
+      if (!named) d_.vibrations.push_back(text);
+    }
+  }
+
   /// What an axis did in one lap and not in another.
   void tell_events() {
     std::map<std::size_t, std::string> times;
@@ -518,10 +543,9 @@ class Report {
   }
 
   void judge() {
-    const auto of_setup = [](const FoundEffect& e) { return e.place == "setup"; };
     // What is no part of the search was explained before it began.
     const bool beforehand =
-        before_.slip || std::any_of(d_.effects.begin(), d_.effects.end(), of_setup);
+        before_.slip || !std::all_of(d_.effects.begin(), d_.effects.end(), is_of_machine);
     const double before =
         excess(beforehand ? evidence_.chi2(evidence_.residual(evidence_.predict(of_.declared)),
                                            Role::held_out)
@@ -530,7 +554,7 @@ class Report {
     const double after = excess(kept.held_out);
     const double ratio = 1 + after / std::max(1.0, floor_);
     // A piece that lies elsewhere is no fault of the machine.
-    const bool named = !std::all_of(d_.effects.begin(), d_.effects.end(), of_setup);
+    const bool named = std::any_of(d_.effects.begin(), d_.effects.end(), is_of_machine);
     d_.explained_share = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
     d_.left = ratio < kQuiet ? 0 : std::sqrt(ratio);
     const bool excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),

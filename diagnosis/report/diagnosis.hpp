@@ -78,7 +78,9 @@ struct Diagnosis {
   double left = 0;  ///< RMS in units of the noise, of all signals; 0: no more than noise
   std::vector<FoundEffect> effects;  ///< by what they do to the contour error
   std::optional<LearnedLaw> law;
-  std::vector<std::string> vibrations;  ///< "X vibrates by itself at 83 Hz", of unknown cause
+  /// "X vibrates by itself at 83 Hz", "deflection x shifts by 1.2 um from lap to lap": of unknown
+  /// cause.
+  std::vector<std::string> vibrations;
   std::vector<SignalFigure> figures;
   std::vector<Excitation> excitation;
   std::vector<Rung> ladder;

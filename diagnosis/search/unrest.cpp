@@ -97,4 +97,29 @@ std::vector<Unrest> unrest_of(const Evidence& evidence, const Prediction& predic
                         [&](std::size_t c) -> const std::vector<double>& { return prediction[c]; });
 }
 
+std::optional<double> shift_between_laps(const Evidence& evidence, const Prediction& prediction,
+                                         std::size_t channel) {
+  const auto& [kind, axis] = evidence.replica().channels()[channel];
+  const std::vector<double>& measured = evidence.record().find(kind, axis)->value;
+  double squares = 0, conditions = 0;
+  for (const std::vector<Stretch>& laps : evidence.partition().repetitions()) {
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (const Stretch& lap : laps) {
+      double sum = 0, count = 0;
+      for (std::size_t k = lap.begin; k < lap.end; ++k) {
+        const double off = measured[k] - prediction[channel][k];
+        if (std::isfinite(off)) sum += off, ++count;
+      }
+      if (count == 0) continue;
+      low = std::min(low, sum / count);
+      high = std::max(high, sum / count);
+    }
+    if (!(high > low)) continue;
+    squares += (high - low) * (high - low);
+    ++conditions;
+  }
+  if (conditions == 0) return {};
+  return std::sqrt(squares / conditions);
+}
+
 }  // namespace vcnc

@@ -41,4 +41,10 @@ HealthyNoise healthy_noise(const Evidence& evidence);
 /// The same of a prediction, which has no noise.
 std::vector<Unrest> unrest_of(const Evidence& evidence, const Prediction& prediction);
 
+/// What the means of laps of one condition differ by in a channel less a prediction, RMS over the
+/// conditions of the largest less the smallest [SI]; none where nothing is repeated. A piece that
+/// slips in its clamps, or drifts, does that.
+std::optional<double> shift_between_laps(const Evidence& evidence, const Prediction& prediction,
+                                         std::size_t channel);
+
 }  // namespace vcnc

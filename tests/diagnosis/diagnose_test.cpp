@@ -412,6 +412,21 @@ TEST(Diagnose, WhereThePieceWasClampedIsToldAndIsNoFaultOfTheMachine) {
   EXPECT_GT(d.explained_share, 0.99);
 }
 
+TEST(Diagnose, APieceThatSlipsBetweenLapsIsNotSilence) {
+  for (const double slip_um : {0.0, 1.0}) {
+    Record record = measured({}, 48);
+    const Stretch& last = record.stretches[1];  // of four laps of the first condition
+    for (MeasuredSignal& s : record.signals)
+      if (s.kind == SignalKind::deflection)
+        for (std::size_t k = last.begin; k < last.end; ++k) s.value[k] += 1e-6 * slip_um;
+    const Diagnosis d = diagnosed(record);
+    const bool slips = slip_um > 0;
+    EXPECT_EQ(d.verdict, slips ? DiagnosisVerdict::unexplained : DiagnosisVerdict::no_deviation);
+    EXPECT_EQ(verdict_sentence(d).find("shifts by 0.5") != std::string::npos, slips)
+        << verdict_sentence(d);
+  }
+}
+
 TEST(Diagnose, WhatMayBeAsDeclaredIsNotTold) {
   // Declared with a play that is there: whatever is fitted of it, it is no finding.
   const Machine as_declared = toy::machine({{"effects.X.load_play.width_um", 3}});
