@@ -6,7 +6,8 @@
 //   NO DEVIATION      nothing was found and c < 1.05
 //   EXPLAINED         something was found and c < 1.05, or at least 98 % of the excess is gone
 //   PARTLY            something was found, but more is left
-//   UNEXPLAINED       something repeatable is left that no effect of the library makes
+//   UNEXPLAINED       something is left that no effect of the library makes: it repeats, or an axis
+//                     vibrates, or readings shift from lap to lap by three times their noise
 //
 // In absolute mode c > 1.1 after the fit is model form error: what the model and the machine do
 // differently by themselves. Its share of the excess is told and no effect may be called a cause.
