@@ -270,6 +270,11 @@ void add_diagnose(CLI::App& app, int& code) {
   diagnose->add_option("--map", o->map, "what the columns of tables are (see vcnc import)");
   diagnose->add_option("--reference", o->reference,
                        "the same program when the machine was healthy");
+  diagnose
+      ->add_option("--suspect", o->suspects,
+                   "seek nothing but this effect (backlash, X.backlash) or declared number "
+                   "(axes.X.load_kg); may be told several times")
+      ->allow_extra_args(false);
   diagnose->add_option("--without", o->without,
                        "an effect the library is to be without: what it makes then has no name");
   diagnose->add_option("--test", o->tests, "a run to be predicted, not fitted")

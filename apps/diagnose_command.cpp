@@ -21,6 +21,8 @@
 #include "diagnosis/report/diagnosis_json.hpp"
 #include "diagnosis/report/diagnosis_page.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
+#include "diagnosis/search/freed_number.hpp"
+#include "diagnosis/search/suspects.hpp"
 
 namespace vcnc {
 
@@ -80,14 +82,15 @@ int compare_models(const DiagnoseOptions& options, const Record& record, const M
   return stop_requested() ? kExitInterrupted : kExitOk;
 }
 
-std::vector<Candidate> candidates_without(const Machine& declared,
-                                          const std::vector<std::string>& effects) {
+std::vector<Candidate> candidates_of(const DiagnoseOptions& options, const Machine& declared) {
   std::vector<Candidate> all = candidates(declared);
-  for (const std::string& effect : effects)
+  for (const std::string& effect : options.without)
     if (std::erase_if(all, [&](const Candidate& c) { return c.effect == effect; }) == 0)
       throw InputError("--without: \"" + effect +
                        "\" is no effect that a diagnosis would try; vcnc effects lists them");
-  return all;
+  std::vector<std::string> numbers;
+  for (const FreedNumber& n : nuisances(declared)) numbers.push_back(n.number.key);
+  return suspected(std::move(all), numbers, options.suspects);
 }
 
 /// `seen` becomes what the diagnosis was made on: in differential mode the record less the healthy
@@ -99,16 +102,18 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
     progress.show(fmt::format("{} {:.0f} %", p.doing, p.share * 100));
     return !stop_requested();
   };
-  const DiagnosisCase of{record, replica, declared, candidates_without(declared, options.without)};
+  const DiagnosisCase of{record, replica, declared, candidates_of(options, declared)};
   if (!options.reference.empty()) progress.show("fitting the reference run");
   const std::optional<HealthyRun> healthy = reference_run(options, declared);
+  DiagnosisOptions asked;
+  asked.suspects = options.suspects;
   Diagnosis d;
   if (healthy) {
     const DifferentialRecord difference = less_healthy(record, *healthy);
     seen = difference.record;
-    d = diagnose(of, difference, {}, keep_going);
+    d = diagnose(of, difference, asked, keep_going);
   } else {
-    d = diagnose(of, {}, keep_going);
+    d = diagnose(of, asked, keep_going);
   }
   progress.show("predicting test runs");
   predict_tests(options, healthy, d.declared, d.found, d.figures);
@@ -125,8 +130,11 @@ int diagnose_command(const DiagnoseOptions& options) {
   const Machine declared = declared_machine(options.model, record);
   if (!options.compare.empty()) return compare_models(options, record, declared);
   const bool bare = is_bare_encoder(record);
-  if (bare && !(options.reference.empty() && options.tests.empty()))
-    throw InputError("--reference, --test: are for machines, not for the signals of an encoder");
+  if (bare && !(options.reference.empty() && options.tests.empty() && options.suspects.empty() &&
+                options.without.empty()))
+    throw InputError(
+        "--reference, --test, --suspect, --without: are for machines, not for the signals of an "
+        "encoder");
   const std::string page = "report.html";
   std::filesystem::path folder;
   if (!options.out.empty()) folder = page_folder(options.out, page, kDiagnosisMark);

@@ -83,6 +83,7 @@ class Report {
     d_.declared = of.declared;
     d_.found = selection_.found.machine;
     d_.warnings = of.record.warnings;
+    d_.suspects = options.suspects;
     const NoiseAudit& noise = evidence.noise();
     d_.warnings.insert(d_.warnings.end(), noise.warnings.begin(), noise.warnings.end());
     if (selection_.interrupted)
@@ -404,7 +405,7 @@ class Report {
 
   /// Readings that are elsewhere in every lap: noise to a fit, but more than samples have.
   void tell_shifts_between_laps() {
-    if (selection_.interrupted) return;
+    if (selection_.interrupted || !options_.suspects.empty()) return;
     const bool named = std::any_of(d_.effects.begin(), d_.effects.end(), is_of_machine);
     const Prediction left = evidence_.predict(d_.found);
     const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
@@ -444,6 +445,7 @@ class Report {
   }
 
   void tell_law() {
+    if (!options_.suspects.empty()) return;
     const double left = excess(found().held_out);
     const bool quiet = left < options_.law_gain + kFloorScatter * floor_;
     if (quiet && found().added.empty()) return;
@@ -555,6 +557,7 @@ class Report {
     const double ratio = 1 + after / std::max(1.0, floor_);
     // A piece that lies elsewhere is no fault of the machine.
     const bool named = std::any_of(d_.effects.begin(), d_.effects.end(), is_of_machine);
+    d_.chi2 = {before + floor_, after + floor_, floor_};
     d_.explained_share = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
     d_.left = ratio < kQuiet ? 0 : std::sqrt(ratio);
     const bool excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),

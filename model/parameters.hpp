@@ -4,7 +4,9 @@
 // "effects.X.backlash.gap_um"); components of a vector are named .x, .y, .z.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "model/machine.hpp"
@@ -30,6 +32,10 @@ struct WholeParameter {
   Range range;
 };
 std::vector<WholeParameter> whole_parameters(Machine& machine);
+
+/// One of them; empty: there is none of this key.
+std::optional<Parameter> find_parameter(Machine& machine, std::string_view key);
+std::optional<WholeParameter> find_whole_parameter(Machine& machine, std::string_view key);
 
 /// Sets one number, given in the unit of its key. Throws std::invalid_argument for an unknown key
 /// or a value out of range, with what is allowed.

@@ -278,11 +278,7 @@ AxisFingerprint fingerprint_of_axis(const Machine& hypothesis, const Machine& ac
       return;
     Fingerprint& print =
         std::is_same_v<typename Effect::Port, DisplacementPort> ? displacement : drive;
-    for (const char c : Effect::text.name) print.add(c);
-    if constexpr (Effect::place == Place::axis)
-      Effect::fields(effect, print, rotary);
-    else
-      Effect::fields(effect, print);
+    add_effect(print, effect, of);
   });
   for (const Law& law : actual.effects.laws)
     if (law.axis_index() == axis && law.point != Law::Point::reading)

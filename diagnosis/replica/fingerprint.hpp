@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "model/axes.hpp"
+#include "model/effects/effect.hpp"
 #include "model/fields.hpp"
 
 namespace vcnc {
@@ -66,5 +68,16 @@ class Fingerprint {
  private:
   std::string bytes_;
 };
+
+/// One effect at its axis, or kAxisCount.
+template <class Effect>
+void add_effect(Fingerprint& print, const Effect& effect, std::size_t axis) {
+  for (const char c : Effect::text.name) print.add(c);
+  print.add(axis);
+  if constexpr (Effect::place == Place::axis)
+    Effect::fields(effect, print, is_rotary(axis));
+  else
+    Effect::fields(effect, print);
+}
 
 }  // namespace vcnc

@@ -135,13 +135,8 @@ class CoarseContact {
 /// Adds the effects of one stage.
 void add_effects(Fingerprint& print, const Machine& actual, EffectStage stage) {
   for_each_effect_of(actual.effects, [&]<class Effect>(const Effect& effect, std::size_t axis) {
-    if (stage_of<typename Effect::Port>() != stage || effect.null()) return;
-    for (const char c : Effect::text.name) print.add(c);
-    print.add(axis);
-    if constexpr (Effect::place == Place::axis)
-      Effect::fields(effect, print, is_rotary(axis));
-    else
-      Effect::fields(effect, print);
+    if (stage_of<typename Effect::Port>() == stage && !effect.null())
+      add_effect(print, effect, axis);
   });
 }
 

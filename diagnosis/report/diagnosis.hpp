@@ -71,10 +71,17 @@ struct Rung {
   std::vector<double> rms;  ///< held-out, per channel
 };
 
+/// Chi-square on held-out laps before and after, and what noise leaves of it.
+struct HeldOut {
+  double before = 0, after = 0, noise = 0;
+};
+
 struct Diagnosis {
   DiagnosisVerdict verdict = DiagnosisVerdict::no_deviation;
   bool differential = false;  ///< against a healthy reference run
   double explained_share = 0, model_form_share = 0;
+  HeldOut chi2;
+  std::vector<std::string> suspects;  ///< all that was sought; none: everything
   double left = 0;  ///< RMS in units of the noise, of all signals; 0: no more than noise
   std::vector<FoundEffect> effects;  ///< by what they do to the contour error
   std::optional<LearnedLaw> law;

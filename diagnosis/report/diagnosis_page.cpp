@@ -213,6 +213,9 @@ std::string diagnosis_page(const DiagnosisStory& story) {
       d.differential ? "differential: what a healthy run has besides is taken off"
                      : "absolute: all that differs from the declared model",
       verdict_class(d.verdict), to_string(d.verdict), escaped(verdict_sentence(d)));
+  if (!d.suspects.empty())
+    page += fmt::format("<p>Sought was nothing but {}.</p>\n",
+                        escaped(fmt::to_string(fmt::join(d.suspects, ", "))));
   if (!d.effects.empty()) {
     page += "<h2>What was found</h2>\n";
     for (const FoundEffect& e : d.effects) page += effect_box(e);

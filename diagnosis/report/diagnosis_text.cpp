@@ -58,7 +58,8 @@ std::string verdict_sentence(const Diagnosis& d) {
     case DiagnosisVerdict::unexplained:
       if (d.law) return d.law->words;
       if (!d.vibrations.empty()) return fmt::to_string(fmt::join(d.vibrations, ", "));
-      return "something is there that nothing in the library explains";
+      return d.suspects.empty() ? "something is there that nothing in the library explains"
+                                : "something is there that no suspect explains";
     case DiagnosisVerdict::no_deviation:
       return std::string("the machine does what is declared, within what this run can show") +
              (d.effects.empty() ? "" : "; the piece is not where it is declared");
@@ -89,6 +90,8 @@ std::string to_text(const Diagnosis& d) {
   std::string text = fmt::format("{}: {}\nmode: {}\n", to_string(d.verdict), verdict_sentence(d),
                                  d.differential ? "differential, against the reference run"
                                                 : "absolute, against the declared model");
+  if (!d.suspects.empty())
+    text += fmt::format("sought: nothing but {}\n", fmt::join(d.suspects, ", "));
   for (const FoundEffect& e : d.effects) {
     std::string numbers;
     for (const FittedNumber& n : e.numbers) {

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "diagnosis/search/parallel.hpp"
+#include "diagnosis/search/suspects.hpp"
 
 namespace vcnc {
 namespace {
@@ -341,6 +342,7 @@ std::vector<Contender> Contest::releases(Released which) const {
     const FreedNumber& n = now_.nuisances.numbers[i];
     const double far = rules_.options.out_of_tolerance;
     if (n.common() || n.tolerance <= 0 || n.number.key.starts_with("effects.setup.") ||
+        !is_suspected(rules_.options.suspects, n.number.key) ||
         (which == Released::where_pulled && std::abs(n.pull()) < far))
       continue;
     Eigen::VectorXd precision = ground_.precision;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "diagnosis/search/freed_number.hpp"
@@ -33,6 +34,8 @@ struct DiagnosisOptions {
   double out_of_tolerance = 4.5;  ///< pull of a declared number
   double release_gain = 25;       ///< of one whose tolerance is lifted, priors included
   double clamped_um = 5;          ///< offset of the piece that is worth a word; 10 urad per um
+  /// All that is sought (suspects.hpp); none: everything.
+  std::vector<std::string> suspects;
   /// Numbers that a healthy run has in common with the one that is explained.
   std::vector<FreedNumber> common;
   /// Axes that vibrate by themselves: what else their drives do is not sought.

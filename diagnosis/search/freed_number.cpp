@@ -75,10 +75,8 @@ double number_of(const Machine& machine, const std::string& key) {
   if (const Deviation* d = deviation_of(machine, key)) return d->value;
   if (key.starts_with(kCommon)) return 0;
   Machine copy = machine;
-  for (const Parameter& p : parameters(copy))
-    if (p.key == key) return p.in_unit();
-  for (const WholeParameter& p : whole_parameters(copy))
-    if (p.key == key) return *p.value;
+  if (const auto p = find_parameter(copy, key)) return p->in_unit();
+  if (const auto p = find_whole_parameter(copy, key)) return *p->value;
   throw std::invalid_argument(key + ": is not a number of a machine file");
 }
 
@@ -89,27 +87,19 @@ void move_number(Machine& machine, const std::string& key, double value) {
     deviation->value = value;
     return;
   }
-  for (const Parameter& p : parameters(machine)) {
-    if (p.key == key) return put(p, deviation, value);
-  }
-  for (const WholeParameter& p : whole_parameters(machine)) {
-    if (p.key != key) continue;
-    *p.value = static_cast<int>(std::lround(std::clamp(value, p.range.min, p.range.max)));
-    return;
-  }
-  throw std::invalid_argument(key + ": is not a number of a machine file");
+  if (const auto p = find_parameter(machine, key)) return put(*p, deviation, value);
+  const auto p = find_whole_parameter(machine, key);
+  if (!p) throw std::invalid_argument(key + ": is not a number of a machine file");
+  *p->value = static_cast<int>(std::lround(std::clamp(value, p->range.min, p->range.max)));
 }
 
 Machine with(Machine machine, const std::vector<FreedNumber>& numbers) {
   for (const FreedNumber& n : numbers)
     if (n.common()) move_number(machine, n.number.key, n.value);
-  std::vector<Parameter> all = parameters(machine);
   for (const FreedNumber& n : numbers) {
     if (n.common()) continue;
-    const auto p = std::find_if(all.begin(), all.end(),
-                                [&](const Parameter& q) { return q.key == n.number.key; });
-    if (p == all.end())
-      throw std::invalid_argument(n.number.key + ": is not a number of a machine file");
+    const auto p = find_parameter(machine, n.number.key);
+    if (!p) throw std::invalid_argument(n.number.key + ": is not a number of a machine file");
     put(*p, deviation_of(machine, n.number.key), n.value);
   }
   return machine;
@@ -123,9 +113,8 @@ void adopt(std::vector<FreedNumber>& numbers, const std::vector<FreedNumber>& fr
 
 void take_values(std::vector<FreedNumber>& numbers, const Machine& machine) {
   Machine copy = machine;
-  for (const Parameter& p : parameters(copy))
-    for (FreedNumber& n : numbers)
-      if (n.number.key == p.key) n.value = p.in_unit();
+  for (FreedNumber& n : numbers)
+    if (const auto p = find_parameter(copy, n.number.key)) n.value = p->in_unit();
   for (FreedNumber& n : numbers)
     if (n.common() || deviation_of(machine, n.number.key))
       n.value = number_of(machine, n.number.key);

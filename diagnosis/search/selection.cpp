@@ -102,7 +102,9 @@ class Search {
   /// Whether one law without a name does what the names so far do not.
   bool imitates(const FittedMachine& now) {
     const double all = rules_.excess(result_.base.held_out);
-    if (now.added.empty() || rules_.excess(now.held_out) < kMostLeft * all) return false;
+    if (now.added.empty() || !options_.suspects.empty() ||
+        rules_.excess(now.held_out) < kMostLeft * all)
+      return false;
     if (!result_.law_alone && go("looking for a law without a name", 0))
       result_.law_alone = best_law(evidence_, result_.base, doubt_of(options_), options_);
     if (!result_.law_alone) return false;

@@ -42,6 +42,7 @@ NOT_REPEATABLE = {"encoder_quantisation", "bus_loss", "bus_jitter", "frame_vibra
                   "sample_jitter", "dropped_samples"}
 BEFORE_THE_COMMAND = {"corner_cutting", "chord_error", "path_filter"}
 STOPS_AT_ONCE = {"contact_loss"}  # the NC unit's own check of the readings stops the machine: an alarm, no record of it
+FOUND_BEFOREHAND = {"period_slip"}  # before anything is fitted: nothing to suspect
 SET_UP = {"piece_offset", "piece_tilt"}  # clamped anew for every run: never a finding
 S_PIECE = HERE.parents[1] / "configs/pieces/s_eq1.toml"
 MODEL = "found.toml"  # what a diagnosis calls the machine it found
@@ -68,6 +69,18 @@ def kept(path, make):
     return row
 
 
+def oracle(vcnc, answer, arguments, out):
+    """What a diagnosis leaves that knows which effects there are and fits their numbers alone; nothing where there is
+    nothing to fit."""
+    suspects = [grading.suspect(e) for e in answer["effects"] if e["name"] not in FOUND_BEFOREHAND]
+    if not suspects:
+        return {}
+    run([vcnc, "diagnose", *arguments, *(word for s in suspects for word in ("--suspect", s)), "--out", str(out)])
+    known = json.loads((out / "diagnosis.json").read_text())
+    shutil.rmtree(out)
+    return {"oracle": grading.left_of(known)}
+
+
 def diagnose(vcnc, answer, arguments, out):
     try:
         seconds = run([vcnc, "diagnose", *arguments, "--out", str(out)])
@@ -78,7 +91,12 @@ def diagnose(vcnc, answer, arguments, out):
     if report.get("law"):
         laws = tomllib.loads((out / MODEL).read_text()).get("effects", {}).get("law", [])
         report["law"].update(next((l for l in laws if l.get("label", "").startswith("learned")), {}))
-    return grading.grade(answer, report, seconds)
+    row = grading.grade(answer, report, seconds)
+    if row.get("top") or row["kind"] == "without":
+        # An effect that was left out of the library is there for who knows it.
+        known = [a for i, a in enumerate(arguments) if "--without" not in arguments[max(0, i - 1):i + 1]]
+        row |= oracle(vcnc, answer, known, out.with_name(out.name + "_oracle"))
+    return row
 
 
 # --- the virtual machine as the generator -------------------------------------------------------------

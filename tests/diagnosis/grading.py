@@ -69,6 +69,19 @@ def same(effect, found):
     return False
 
 
+def suspect(effect):
+    """How `vcnc diagnose --suspect` calls an effect."""
+    if effect["name"] == "load_mass":
+        return f"axes.{effect['place']}.load_{'kgm2' if effect['place'] in 'AC' else 'kg'}"
+    return f"{effect['place']}.{ALIASES.get(effect['name'], effect['name'])}"
+
+
+def left_of(report):
+    """Of held-out laps: RMS of every signal that has noise, and chi-square with what noise leaves of it."""
+    return {"rms": {f["signal"]: f["rms_after"] for f in report.get("figures", [])
+                    if f.get("rms_floor") and "held" in f["run"]}, **report["chi2_held_out"]}
+
+
 def label(e):
     return f"{e['name']} {e.get('axis', e.get('place'))}"
 
@@ -183,6 +196,7 @@ def grade(answer, report, seconds):
         if f.get("rms_floor") and "held" in f["run"]:
             ratios.append(f["rms_after"] / f["rms_floor"])
     row["after_over_floor"] = max(ratios) if ratios else None
+    row["left"] = left_of(report)
     return row
 
 
@@ -233,9 +247,31 @@ def summary(rows):
     ratios = [r["after_over_floor"] for r in single if r["top"] and r["after_over_floor"]]
     out["held-out RMS after / floor, worst signal, median / p95"] = (
         f"{statistics.median(ratios):.3f} / {percentile(ratios, 95):.3f}" if ratios else "none")
+    out.update(beside_the_oracle(strong + [r for r in rows if r["kind"] == "pair" and r["strength"] >= 3],
+                                 [r for r in rows if r["kind"] == "without"]))
     out.update(transferred(clean, strong))
     seconds = [r["seconds"] for r in rows]
     out["processor time of a diagnosis, median / largest [s]"] = f"{statistics.median(seconds):.1f} / {max(seconds):.1f}"
+    return out
+
+
+def beside_the_oracle(strong, left_out):
+    """Held against a diagnosis that knows which effects there are: what strong ones leave, and whether one that was left
+    out of the library leaves so much less than what stands in for it that the record tells them apart: by what an
+    effect must gain to be told, a thousandth of what noise leaves."""
+    out = {}
+    some = [r for r in strong if "oracle" in r]
+    if some:
+        worst = [max(v / r["oracle"]["rms"][s] for s, v in r["left"]["rms"].items()) for r in some]
+        all_signals = [math.sqrt(r["left"]["after"] / r["oracle"]["after"]) for r in some]
+        for text, ratios in (("all signals", all_signals), ("worst signal", worst)):
+            out[f"held-out RMS / oracle's, {text}, median / p95"] = (
+                f"{statistics.median(ratios):.4f} / {percentile(ratios, 95):.4f} (n = {len(ratios)})")
+    told_apart = [r for r in left_out if "oracle" in r and
+                  (r["rejected"] or r["left"]["after"] - r["oracle"]["after"] > 1e-3 * r["left"]["noise"])]
+    if left_out:
+        out["left out of the library: not explained away, where the record tells it from what stands in"] = share(
+            r["rejected"] for r in told_apart)
     return out
 
 

@@ -14,8 +14,8 @@ TRUTH = {"kind": "single", "number": 3, "effects": [{"name": "backlash", "place"
          "values": {"effects.X.backlash.gap_um": 4.0}}
 
 
-def report(*effects, verdict="EXPLAINED", **more):
-    return {"verdict": verdict, "effects": list(effects), **more}
+def report(*effects, verdict="EXPLAINED", left=(9.0, 1.0, 1.0), **more):
+    return {"verdict": verdict, "effects": list(effects), "chi2_held_out": dict(zip(("before", "after", "noise"), left)), **more}
 
 
 def found(name, axis, key="", value=0.0, low=0.0, high=0.0, **more):
@@ -52,6 +52,38 @@ class Grading(unittest.TestCase):
         self.assertEqual(told[f"{of}: left, median / p95"], "35 / 50 nm (n = 2)")
         self.assertEqual(told[f"{of}: left of the declared model's, median / p95"], "25.5 % / 50 % (n = 2)")
         self.assertEqual(told[f"{of}: left of the declared model's, where that is over 200 nm, median / p95"], "1.0 % / 1 % (n = 1)")
+
+    def test_what_is_left_is_held_against_who_knows_the_effects(self):
+        def held_out(x, y):
+            return [{"signal": s, "run": "held-out laps", "rms_after": rms, "rms_floor": 1.0} for s, rms in (("x", x), ("y", y))]
+
+        limit = [{"name": "X.backlash", "detection_limit": 0.5, "excited": True}]
+        told = found("backlash", "X", "effects.X.backlash.gap_um", 4.0, 3.9, 4.1)
+        row = grading.grade(TRUTH, report(told, excitation=limit, left=(9e6, 1.21e6, 1e6), figures=held_out(1.1, 1.0)), 1)
+        row["oracle"] = grading.left_of(report(left=(9e6, 1e6, 1e6), figures=held_out(1.0, 1.25)))
+        of = "held-out RMS / oracle's"
+        self.assertEqual(grading.summary([row])[f"{of}, all signals, median / p95"], "1.1000 / 1.1000 (n = 1)")
+        self.assertEqual(grading.summary([row])[f"{of}, worst signal, median / p95"], "1.1000 / 1.1000 (n = 1)")
+
+    def test_what_the_record_cannot_tell_apart_is_no_mistake(self):
+        def left_out(verdict, after):
+            answer = TRUTH | {"kind": "without", "without": "backlash", "law_axes": ["X"], "law_points": []}
+            row = grading.grade(answer, report(found("kv_error", "X"), verdict=verdict, left=(9e6, after, 1e6)), 1)
+            return row | {"oracle": grading.left_of(report(left=(9e6, 1e6, 1e6)))}
+
+        rows = [left_out("PARTLY", 1.0e6), left_out("EXPLAINED", 1.0005e6), left_out("EXPLAINED", 1.002e6)]
+        told = grading.summary(rows)
+        self.assertEqual(told["left out of the library: not explained away"], "1/3 (33.3 %)")
+        key = "left out of the library: not explained away, where the record tells it from what stands in"
+        self.assertEqual(told[key], "1/2 (50.0 %)")
+
+    def test_suspects_are_called_as_the_diagnosis_does(self):
+        def of(name, place):
+            return grading.suspect({"name": name, "place": place})
+
+        self.assertEqual(of("backlash", "X"), "X.backlash")
+        self.assertEqual(of("bus_latency", "C"), "C.command_delay")
+        self.assertEqual((of("load_mass", "A"), of("load_mass", "Y")), ("axes.A.load_kgm2", "axes.Y.load_kg"))
 
     def test_a_wave_half_a_turn_on_is_the_same(self):
         key = "effects.probe.tip_lobing."

@@ -86,6 +86,8 @@ TEST_F(DiagnoseCli, TheTableItselfWithItsMapGivesTheSameVerdict) {
 TEST_F(DiagnoseCli, RefusesWhatItCannotUseAndLeavesNothingBehind) {
   const std::string table = scratch_ / "bad.csv", map = scratch_ / "map.toml";
   expect_refused("diagnose " + table, "a table needs --map");
+  expect_refused("diagnose " + table + " --map " + map + " --suspect X.rust",
+                 "--suspect, --without: are for machines");
   expect_refused("diagnose " + (scratch_ / "none.h5"), "no such file or folder");
   expect_refused("import " + table + " --map " + map, "--out: is missing");
   expect_refused("import " + table + " --map " + map + " --out " + map,
@@ -136,6 +138,14 @@ TEST_F(DiagnoseCli, RunsAreComparedLessTheHealthyOneOfTheirProgram) {
   };
   const std::string less = " --reference " + sick,
                     tests = " --test " + sicker + " --test " + longer;
+  const Said suspicion = vcnc("diagnose " + sicker + " --reference " + sick + " --model " +
+                              machine + " --suspect X.coulomb");
+  EXPECT_EQ(suspicion.code, 0) << suspicion.err;
+  EXPECT_NE(suspicion.out.find("sought: nothing but X.coulomb"), std::string::npos)
+      << suspicion.out;
+  EXPECT_NE(suspicion.out.find("X.coulomb: level_N = "), std::string::npos) << suspicion.out;
+  expect_refused("diagnose " + sicker + " --model " + machine + " --suspect X.rust",
+                 "--suspect: \"X.rust\" is no effect");
   EXPECT_GT(off("run", ""), 150);
   EXPECT_NEAR(off("run", less), 0, 1e-6);  // the healthy run is as far off
   const double alone = off(sicker, tests);
