@@ -43,10 +43,17 @@ std::unique_ptr<MachineReplica> replica_of(const Record& record, const Machine& 
   return replica;
 }
 
+/// What both machines are off a record, less what a healthy run of its program has besides where
+/// there is one (else null).
 void append_figures(std::vector<SignalFigure>& figures, const Record& record,
-                    const Machine& declared, const Machine& found, const std::string& name) {
-  const auto replica = replica_of(record, declared);
-  const std::vector<SignalFigure> more = figures_of(record, *replica, declared, found, name);
+                    const HealthyRun* healthy, const Machine& declared, const Machine& found,
+                    const std::string& name) {
+  DifferentialRecord less;
+  if (healthy) less = less_healthy(record, *healthy);
+  const Record& of = healthy ? less.record : record;
+  const auto replica = replica_of(of, declared);
+  const std::vector<SignalFigure> more =
+      figures_of(of, *replica, declared, found, name, less.noise_scale);
   figures.insert(figures.end(), more.begin(), more.end());
 }
 
@@ -56,10 +63,9 @@ void predict_tests(const DiagnoseOptions& options, const std::optional<HealthyRu
                    std::vector<SignalFigure>& figures) {
   for (const std::string& test : options.tests) {
     if (stop_requested()) return;
-    Record record = load_record(test, options.map);
-    if (healthy && same_program(record, healthy->record))
-      record = less_healthy(record, *healthy).record;
-    append_figures(figures, record, declared, found, test);
+    const Record record = load_record(test, options.map);
+    const bool beside = healthy && same_program(record, healthy->record);
+    append_figures(figures, record, beside ? &*healthy : nullptr, declared, found, test);
   }
 }
 
@@ -75,8 +81,7 @@ int compare_models(const DiagnoseOptions& options, const Record& record, const M
   std::vector<SignalFigure> figures;
   const std::optional<HealthyRun> healthy = reference_run(options, declared);
   const Machine& before = healthy ? healthy->machine : declared;
-  append_figures(figures, healthy ? less_healthy(record, *healthy).record : record, before, found,
-                 "run");
+  append_figures(figures, record, healthy ? &*healthy : nullptr, before, found, "run");
   predict_tests(options, healthy, before, found, figures);
   std::cout << figures_table(figures);
   return stop_requested() ? kExitInterrupted : kExitOk;

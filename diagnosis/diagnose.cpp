@@ -199,13 +199,13 @@ Diagnosis diagnose(const DiagnosisCase& of, const DifferentialRecord& difference
 
 std::vector<SignalFigure> figures_of(const Record& record, Replica& replica,
                                      const Machine& declared, const Machine& found,
-                                     const std::string& name) {
-  Evidence evidence(record, replica, declared);
+                                     const std::string& name, double noise_scale) {
+  Evidence evidence(record, replica, declared, noise_scale);
   const Prediction before = evidence.predict(declared), after = evidence.predict(found);
   std::vector<SignalFigure> all;
   for (std::size_t c = 0; c < replica.channels().size(); ++c)
     all.push_back({replica.channels()[c], name, evidence.rms(before, c, Role::both),
-                   evidence.rms(after, c, Role::both), evidence.noise().channels[c].rms});
+                   evidence.rms(after, c, Role::both), evidence.noise_left(c)});
   return all;
 }
 

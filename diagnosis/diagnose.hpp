@@ -25,9 +25,10 @@ Diagnosis diagnose(const DiagnosisCase& of, const DiagnosisOptions& options = {}
 Diagnosis diagnose(const DiagnosisCase& of, const DifferentialRecord& difference,
                    const DiagnosisOptions& options = {}, const KeepGoing& keep_going = {});
 
-/// How well two machines predict a run that was not used: one figure per channel.
+/// How well two machines predict a run that was not used: one figure per channel; `noise_scale` is
+/// that of a difference from a healthy run.
 std::vector<SignalFigure> figures_of(const Record& record, Replica& replica,
                                      const Machine& declared, const Machine& found,
-                                     const std::string& name);
+                                     const std::string& name, double noise_scale = 1);
 
 }  // namespace vcnc

@@ -22,6 +22,10 @@ namespace vcnc {
 namespace {
 
 constexpr double kQuiet = 1.05, kAllExplained = 0.98;
+/// Times the noise by which a signal is off for something that is there, and part of what it was
+/// off by before that a model of what was found may be wrong by.
+constexpr double kLoud = 1.5, kWrongOfFound = 0.05;
+constexpr double kFewSamples = 200;
 /// Part of the noise's chi-square that no law is sought in.
 constexpr double kFloorScatter = 0.04;
 /// Times the noise of a sample by which readings may shift from lap to lap.
@@ -96,6 +100,7 @@ class Report {
     tell_clamping();
     tell_noise_lines();
     tell_events();
+    tell_what_is_still_off();
     if (!selection_.interrupted) tell_law();
     tell_chatter();
     tell_shifts_between_laps();
@@ -444,20 +449,50 @@ class Report {
       e.minor = e.contour_error_um < 0.02 * largest && e.contour_error_um < 0.5;
   }
 
+  /// Tells signals that are still off by more than noise, and by more of what they were off than a
+  /// model of something that was found may be wrong by. Of an axis that vibrates by itself, and of
+  /// what that makes of the readings, tell_chatter() tells.
+  void tell_what_is_still_off() {
+    if (!evidence_.noise().from_repetitions || !before_.chatter.empty()) return;
+    const std::vector<double> before = evidence_.rms_within_laps(evidence_.predict(of_.declared),
+                                                                 Role::held_out),
+                              after = evidence_.rms_within_laps(found().prediction, Role::held_out);
+    for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c) {
+      const double n = evidence_.count(c, Role::held_out);
+      if (n < kFewSamples) continue;
+      const double form = c < options_.form_of_channel.size() ? options_.form_of_channel[c] / n : 0,
+                   noise = evidence_.reckoned_with(c) * std::sqrt(1 + form), was = before[c],
+                   is = after[c];
+      const auto beyond = [&](double rms) {
+        return std::sqrt(std::max(0.0, rms * rms - noise * noise));
+      };
+      if (is < kLoud * noise || beyond(is) < kWrongOfFound * beyond(was)) continue;
+      still_off_ = true;
+      const ComparedChannel& channel = evidence_.replica().channels()[c];
+      const ShownUnit unit = shown_unit(channel);
+      d_.notes.push_back(fmt::format(
+          "{} is still off by {:.3g} {} rms on held-out laps, {:.3g} times "
+          "its noise; it was {:.3g}.",
+          channel_name(channel), is * unit.factor, unit.name, is / noise, was * unit.factor));
+    }
+  }
+
   void tell_law() {
     if (!options_.suspects.empty()) return;
     const double left = excess(found().held_out);
-    const bool quiet = left < options_.law_gain + kFloorScatter * floor_;
+    const bool quiet = !still_off_ && left < options_.law_gain + kFloorScatter * floor_;
     if (quiet && found().added.empty()) return;
     const double needed = std::max({options_.law_gain, options_.least_share * left,
                                     options_.share_of_form * std::min(left, options_.form)});
     const std::vector<double> base = evidence_.chi2_of(selection_.base.residual, Role::held_out),
                               now = evidence_.chi2_of(found().residual, Role::held_out);
     const bool anything = found().found() > 0;
+    // What leaves more than a model of the true cause may is believed no further than it explains.
+    const bool believed = anything && !still_off_;
     LawFit law;
     if (!quiet)
       law = best_law(evidence_, found(),
-                     anything ? doubt_of(options_, found().explained(), base, now, found().rounding)
+                     believed ? doubt_of(options_, found().explained(), base, now, found().rounding)
                               : doubt_of(options_),
                      options_);
     // A law that does better than all that was named takes the names away; it can explain all that
@@ -532,7 +567,7 @@ class Report {
          {std::pair{Role::fitted, "fitted laps"}, std::pair{Role::held_out, "held-out laps"}})
       for (std::size_t c = 0; c < channels.size(); ++c)
         d_.figures.push_back({channels[c], name, evidence_.rms(before, c, role),
-                              evidence_.rms(after, c, role), evidence_.noise().channels[c].rms});
+                              evidence_.rms(after, c, role), evidence_.noise_left(c)});
   }
 
   void tell_ladder() {
@@ -563,16 +598,18 @@ class Report {
     const bool excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),
                                      [](const Excitation& e) { return e.excited; });
     using enum DiagnosisVerdict;
-    if (evidence_.count(Role::held_out) < 200 || (!excited && !named && ratio < kQuiet))
+    if (evidence_.count(Role::held_out) < kFewSamples ||
+        (!excited && !named && !still_off_ && ratio < kQuiet))
       d_.verdict = not_identifiable;
     else if (d_.law || !d_.vibrations.empty())
       d_.verdict = named ? partly : unexplained;
     else if (!evidence_.noise().from_repetitions)
       d_.verdict = named ? explained : no_deviation;
     else if (named)
-      d_.verdict = ratio < kQuiet || d_.explained_share > kAllExplained ? explained : partly;
+      d_.verdict = !still_off_ && (ratio < kQuiet || d_.explained_share > kAllExplained) ? explained
+                                                                                         : partly;
     else
-      d_.verdict = ratio < kQuiet ? no_deviation : unexplained;
+      d_.verdict = !still_off_ && ratio < kQuiet ? no_deviation : unexplained;
     if (!d_.differential && !selection_.interrupted && evidence_.noise().from_repetitions &&
         ratio > options_.model_form) {
       d_.model_form_share = before > 0 ? std::min(1.0, after / before) : 1;
@@ -590,7 +627,8 @@ class Report {
   SelectionResult selection_;
   FoundBeforehand before_;
   double floor_;
-  bool inexact_;  ///< the model is known not to be the machine
+  bool inexact_;            ///< the model is known not to be the machine
+  bool still_off_ = false;  ///< some signal is, by more than a model of the cause may be wrong by
   bool withdrawn_ = false;
   Diagnosis d_;
 };

@@ -3,11 +3,17 @@
 // Verdict, with c = chi-square per sample on held-out laps (1 is noise):
 //
 //   NOT IDENTIFIABLE  nothing in the library would show, or there is too little to compare
-//   NO DEVIATION      nothing was found and c < 1.05
-//   EXPLAINED         something was found and c < 1.05, or at least 98 % of the excess is gone
+//   NO DEVIATION      nothing was found, c < 1.05 and no signal is still off
+//   EXPLAINED         something was found and c < 1.05, or at least 98 % of the excess is gone, and
+//                     no signal is still off
 //   PARTLY            something was found, but more is left
 //   UNEXPLAINED       something is left that no effect of the library makes: it repeats, or an axis
 //                     vibrates, or readings shift from lap to lap by three times their noise
+//
+// A signal is still off if its RMS is over 1.5 times its noise and what is beyond the noise over a
+// twentieth of what it was: so much a model of the true cause may be wrong by, seldom more, but one
+// that only does something like it. (Chi-square of all signals does not tell: one of sixteen counts
+// little in it.)
 //
 // In absolute mode c > 1.1 after the fit is model form error: what the model and the machine do
 // differently by themselves. Its share of the excess is told and no effect may be called a cause.

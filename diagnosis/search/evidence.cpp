@@ -27,6 +27,18 @@ double dot(const float* a, const float* b, std::size_t n) {
   return ((sum[0] + sum[4]) + (sum[1] + sum[5])) + ((sum[2] + sum[6]) + (sum[3] + sum[7]));
 }
 
+/// Of every series, over what is known of it; of nothing nought.
+std::vector<double> rms_of_all(const SeriesOfChannels& series) {
+  std::vector<double> rms;
+  for (const std::vector<double>& x : series) {
+    double sum = 0, n = 0;
+    for (const double v : x)
+      if (std::isfinite(v)) sum += v * v, n += 1;
+    rms.push_back(n > 0 ? std::sqrt(sum / n) : 0);
+  }
+  return rms;
+}
+
 /// Whose readings say where the ball is.
 Machine without_slip(Machine machine) {
   machine.effects.get<PeriodSlip>() = {};
@@ -104,15 +116,17 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
   of_shifts_ = {};
   if (rounding.empty()) return;
   if (!per_shift_.empty()) whiten_shifts(rms_shift(partition_.stretches, per_shift_, rounding));
-  rms_of_rounding_ = rms_of_readings(rounding);
+  rms_of_rounding_ = rms_of_all(rounding);
   chi2_of_rounding_ = chi2_of(whiten(rounding), Role::held_out);
 }
 
 bool Evidence::underrates_rounding(const Machine& machine) const {
   if (rms_of_rounding_.empty()) return false;
-  const std::vector<double> now = rms_of_readings(rounding_of(machine));
+  const std::vector<double> now = rms_of_all(rounding_of(machine));
   for (std::size_t c = 0; c < now.size(); ++c)
-    if (now[c] > kUnderrated * rms_of_rounding_[c] && now[c] > noise_.channels[c].rms) return true;
+    if (replica_.channels()[c].kind == SignalKind::deflection &&
+        now[c] > kUnderrated * rms_of_rounding_[c] && now[c] > noise_.channels[c].rms)
+      return true;
   return false;
 }
 
@@ -122,18 +136,6 @@ std::vector<double> Evidence::rounding_beyond_reckoned(const Machine& machine) c
   for (std::size_t c = 0; c < beyond.size(); ++c)
     beyond[c] = std::max(0.0, beyond[c] - chi2_of_rounding_[c]);
   return beyond;
-}
-
-std::vector<double> Evidence::rms_of_readings(const SeriesOfChannels& series) const {
-  std::vector<double> rms(series.size(), 0.0);
-  for (std::size_t c = 0; c < series.size(); ++c) {
-    if (replica_.channels()[c].kind != SignalKind::deflection) continue;
-    double sum = 0, n = 0;
-    for (const double x : series[c])
-      if (std::isfinite(x)) sum += x * x, n += 1;
-    if (n > 0) rms[c] = std::sqrt(sum / n);
-  }
-  return rms;
 }
 
 SeriesOfChannels Evidence::rounding_of(const Machine& machine) const {
@@ -254,7 +256,7 @@ std::vector<float> Evidence::whiten(std::size_t channel, const std::vector<doubl
 
 Column Evidence::residual(const Prediction& prediction) const {
   Column::Channels column(prediction.size());
-  for (std::size_t c = 0; c < prediction.size(); ++c) {
+  parallel_for(prediction.size(), [&](std::size_t c) {
     std::vector<double> r(prediction[c].size(), 0.0);
     for (std::size_t k = 0; k < r.size(); ++k) {
       if (!raw_valid_[c][k]) continue;
@@ -263,7 +265,7 @@ Column Evidence::residual(const Prediction& prediction) const {
       r[k] = measured_[c][k] - predicted;
     }
     column[c] = whiten(c, r);
-  }
+  });
   of_shifts_.apply(column);
   return column;
 }
@@ -343,18 +345,34 @@ std::vector<double> Evidence::chi2_of(const Column& column, Role role) const {
   return all;
 }
 
-double Evidence::rms(const Prediction& prediction, std::size_t channel, Role role) const {
+double Evidence::rms_of(const std::vector<double>& series, std::size_t channel, Role role) const {
   double sum = 0, n = 0;
   for (const Block& block : partition_.blocks) {
     if (!takes(block, role)) continue;
     for (std::size_t k = block.begin; k < block.end; ++k) {
-      const double r = measured_[channel][k] - prediction[channel][k];
-      if (!raw_valid_[channel][k] || !std::isfinite(r)) continue;
-      sum += r * r;
+      if (!raw_valid_[channel][k] || !std::isfinite(series[k])) continue;
+      sum += series[k] * series[k];
       n += 1;
     }
   }
   return n > 0 ? std::sqrt(sum / n) : 0;
+}
+
+double Evidence::rms(const Prediction& prediction, std::size_t channel, Role role) const {
+  std::vector<double> off = measured_[channel];
+  for (std::size_t k = 0; k < off.size(); ++k) off[k] -= prediction[channel][k];
+  return rms_of(off, channel, role);
+}
+
+std::vector<double> Evidence::rms_within_laps(const Prediction& prediction, Role role) const {
+  SeriesOfChannels off = measured_;
+  for (std::size_t c = 0; c < off.size(); ++c)
+    for (std::size_t k = 0; k < off[c].size(); ++k) off[c][k] -= prediction[c][k];
+  mask(off);
+  if (!per_shift_.empty()) take_out_shifts(partition_.stretches, per_shift_, off, Shifts::constant);
+  std::vector<double> all;
+  for (std::size_t c = 0; c < off.size(); ++c) all.push_back(rms_of(off[c], c, role));
+  return all;
 }
 
 void Evidence::add_products(const std::vector<const Column*>& columns, std::size_t channel,
@@ -406,7 +424,7 @@ RoleGrams Evidence::cross(const std::vector<const Column*>& a,
                           const std::vector<const Column*>& b) const {
   const auto rows = static_cast<Eigen::Index>(a.size()), cols = static_cast<Eigen::Index>(b.size());
   RoleGrams all = RoleGrams::none(rows, cols, valid_.size());
-  for (std::size_t c = 0; c < valid_.size(); ++c) {
+  parallel_for(valid_.size(), [&](std::size_t c) {
     for (std::size_t j = 0; j < b.size(); ++j) {
       const std::vector<float>& y = (*b[j])[c];
       if (y.empty()) continue;
@@ -419,6 +437,8 @@ RoleGrams Evidence::cross(const std::vector<const Column*>& a,
               dot(&x[block.begin], &y[block.begin], block.end - block.begin);
       }
     }
+  });
+  for (std::size_t c = 0; c < valid_.size(); ++c) {
     all.fitted += all.fitted_of[c];
     all.held_out += all.held_out_of[c];
   }

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <cstddef>
 #include <memory>
 #include <utility>
@@ -69,6 +70,15 @@ class Evidence {
   const Replica& replica() const { return replica_; }
   const Partition& partition() const { return partition_; }
   const NoiseAudit& noise() const { return noise_; }
+  /// RMS of the noise of a sample with that of the healthy run that was taken off [SI].
+  double noise_left(std::size_t channel) const {
+    return noise_scale_ * noise_.channels[channel].rms;
+  }
+  /// The same with what the model is known to leave and what its encoder rounds off.
+  double reckoned_with(std::size_t channel) const {
+    return std::hypot(noise_left(channel), channel < form_.size() ? form_[channel] : 0.0,
+                      channel < rms_of_rounding_.size() ? rms_of_rounding_[channel] : 0.0);
+  }
   /// What the declared machine would have measured.
   const Prediction& declared() const { return declared_; }
   /// What was left out for it: of the axis' own channels, and of the readings.
@@ -117,6 +127,10 @@ class Evidence {
   /// RMS of y - yhat in SI over the samples that count.
   double rms(const Prediction& prediction, std::size_t channel, Role role) const;
 
+  /// Of every channel, less what shifts of the piece, other ones in every lap, make of the
+  /// readings.
+  std::vector<double> rms_within_laps(const Prediction& prediction, Role role) const;
+
   /// Products of all pairs of the columns, per block.
   BlockGrams grams(const std::vector<const Column*>& columns) const;
   Eigen::MatrixXd sum(const BlockGrams& grams, Role role) const;
@@ -130,12 +144,13 @@ class Evidence {
     return role == Role::both || block.held_out == (role == Role::held_out);
   }
   std::vector<float> whiten(std::size_t channel, const std::vector<double>& series) const;
+  /// Of what can be compared of a channel.
+  double rms_of(const std::vector<double>& series, std::size_t channel, Role role) const;
   bool keep_comparable(std::size_t channel, std::vector<double>& change) const;
   /// What these machines make of the readings of the probe, of what each is shifted by [m]; empty
   /// where there are none.
   std::vector<SeriesOfChannels> readings_per_shift(const std::vector<Machine>& shifted) const;
   SeriesOfChannels rounding_of(const Machine& machine) const;
-  std::vector<double> rms_of_readings(const SeriesOfChannels& series) const;  ///< else nought
   void leave_out(const std::vector<LapEvent>& events);
   void count_valid();
   void whiten_shifts(const Eigen::Vector3d& shift);
@@ -160,7 +175,7 @@ class Evidence {
   std::vector<double> form_;
   NoiseAudit noise_;
   ShiftWhitening of_shifts_;
-  /// What is reckoned with: of the readings' rounding, and held-out chi-square of every channel's.
+  /// What is reckoned with of the rounding of each channel: RMS, and held-out chi-square.
   std::vector<double> rms_of_rounding_, chi2_of_rounding_;
 };
 

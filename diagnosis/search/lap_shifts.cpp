@@ -11,7 +11,7 @@
 namespace vcnc {
 namespace {
 
-/// What each shift makes of one sample: constant ones, then growing ones.
+/// What each shift makes of one sample: constant ones, then growing ones if there is room.
 void fill_row(const std::vector<SeriesOfChannels>& per_shift, const Stretch& lap, std::size_t c,
               std::size_t k, Eigen::VectorXd& x) {
   const double t = static_cast<double>(k - lap.begin) / static_cast<double>(lap.end - lap.begin);
@@ -19,7 +19,8 @@ void fill_row(const std::vector<SeriesOfChannels>& per_shift, const Stretch& lap
   for (std::size_t j = 0; j < n; ++j) {
     const double d = std::isfinite(per_shift[j][c][k]) ? per_shift[j][c][k] : 0;
     x[static_cast<Eigen::Index>(j)] = d;
-    x[static_cast<Eigen::Index>(n + j)] = d * (t - 0.5);
+    const auto grown = static_cast<Eigen::Index>(n + j);
+    if (grown < x.size()) x[grown] = d * (t - 0.5);
   }
 }
 
@@ -29,8 +30,9 @@ struct LapShift {
 };
 
 LapShift shift_of(const Stretch& lap, const std::vector<SeriesOfChannels>& per_shift,
-                  const SeriesOfChannels& series) {
-  const auto columns = static_cast<Eigen::Index>(2 * per_shift.size());
+                  const SeriesOfChannels& series, Shifts shifts = Shifts::growing) {
+  const auto columns =
+      static_cast<Eigen::Index>((shifts == Shifts::growing ? 2 : 1) * per_shift.size());
   Eigen::MatrixXd products = Eigen::MatrixXd::Zero(columns, columns);
   Eigen::VectorXd with_series = Eigen::VectorXd::Zero(columns), x(columns);
   for (std::size_t c = 0; c < series.size(); ++c) {
@@ -93,9 +95,10 @@ Eigen::Vector3d rms_shift(const std::vector<Stretch>& laps,
 }
 
 void take_out_shifts(const std::vector<Stretch>& laps,
-                     const std::vector<SeriesOfChannels>& per_shift, SeriesOfChannels& series) {
+                     const std::vector<SeriesOfChannels>& per_shift, SeriesOfChannels& series,
+                     Shifts shifts) {
   for (const Stretch& lap : laps) {
-    const Eigen::VectorXd shift = shift_of(lap, per_shift, series).shift;
+    const Eigen::VectorXd shift = shift_of(lap, per_shift, series, shifts).shift;
     Eigen::VectorXd x(shift.size());
     for (std::size_t c = 0; c < series.size(); ++c) {
       if (per_shift[0][c].empty()) continue;

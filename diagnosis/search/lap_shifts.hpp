@@ -34,9 +34,12 @@ Eigen::Vector3d rms_shift(const std::vector<Stretch>& laps,
                           const std::vector<SeriesOfChannels>& per_shift,
                           const SeriesOfChannels& series);
 
-/// Takes out of every lap what shifts, constant or growing, make of it; any number of them.
+/// Takes out of every lap what shifts make of it, any number of them: constant ones, and with
+/// `growing` such that grow during it, too.
+enum class Shifts { constant, growing };
 void take_out_shifts(const std::vector<Stretch>& laps,
-                     const std::vector<SeriesOfChannels>& per_shift, SeriesOfChannels& series);
+                     const std::vector<SeriesOfChannels>& per_shift, SeriesOfChannels& series,
+                     Shifts shifts = Shifts::growing);
 
 /// Whitens what a shift makes of a lap.
 class ShiftWhitening {

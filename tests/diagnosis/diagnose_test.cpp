@@ -11,6 +11,7 @@
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
 #include "diagnosis/search/period_slip_search.hpp"
+#include "diagnosis/search/suspects.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc {
@@ -51,6 +52,36 @@ TEST(Diagnose, ExplainsWithIntervalAndFigures) {
       EXPECT_GT(f.before, 5 * f.floor);
     }
   }
+}
+
+/// An axis with play that turns over within `speed` where the model's does within 1 mm/s.
+Diagnosis of_play_that_turns_over_within(double speed, const std::vector<std::string>& suspects) {
+  Record record = measured({}, 5);
+  const std::vector<double>& x = record.find(SignalKind::command, 0)->value;
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::deflection)
+      for (std::size_t k = 1; k + 1 < x.size(); ++k)
+        s.value[k] += 5e-6 * std::tanh((x[k + 1] - x[k - 1]) / (2 * record.period) / speed);
+  toy::ToyReplica replica(record);
+  const Machine declared;
+  DiagnosisOptions options;
+  options.suspects = suspects;
+  return diagnose({record, replica, declared, suspected(toy::candidates(), {}, suspects)}, options);
+}
+
+TEST(Diagnose, WhatIsStillLoudIsNotExplained) {
+  const Diagnosis right = of_play_that_turns_over_within(1e-3, {"X.load_play"});
+  EXPECT_EQ(right.verdict, DiagnosisVerdict::explained);
+  EXPECT_TRUE(right.notes.empty()) << right.notes.front();
+  const Diagnosis imitated = of_play_that_turns_over_within(20e-3, {"X.load_play"});
+  EXPECT_EQ(imitated.verdict, DiagnosisVerdict::partly);
+  EXPECT_GT(imitated.explained_share, 0.9);
+  ASSERT_FALSE(imitated.notes.empty());
+  EXPECT_EQ(imitated.notes.front().find("deflection x is still off by "), 0U)
+      << imitated.notes.front();
+  const Diagnosis none = of_play_that_turns_over_within(1e-3, {"X.coulomb"});
+  EXPECT_EQ(none.verdict, DiagnosisVerdict::unexplained);
+  EXPECT_EQ(verdict_sentence(none), "something is there that no suspect explains");
 }
 
 TEST(Diagnose, NamesALawWhereTheLibraryHasNone) {
