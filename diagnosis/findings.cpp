@@ -200,6 +200,7 @@ class Report {
       if (e.numbers.front().low <= n.centre && n.centre <= e.numbers.front().high) {
         d_.notes.push_back(fmt::format("{} may be out of tolerance, or as declared.", key));
         move_number(d_.found, key, number_of(selection_.base.machine, key));
+        put_back_.push_back(n);
         continue;
       }
       const Prediction less = evidence_.predict(without);
@@ -210,6 +211,7 @@ class Report {
       tell_class(e, released->class_with);
       d_.effects.push_back(std::move(e));
     }
+    if (withheld_ || !put_back_.empty()) fit_what_is_told();
   }
 
   void tell_class(FoundEffect& e, const std::vector<std::size_t>& others) const {
@@ -234,9 +236,26 @@ class Report {
 
   /// An effect that is not told; what is declared of it goes into the found machine.
   void withhold(const Candidate& candidate, const std::string& why) {
+    withheld_ = true;
     d_.notes.push_back(fmt::format("{} {}.", candidate.name(), why));
     for (const FreeNumber& n : candidate.numbers)
       move_number(d_.found, n.key, number_of(selection_.base.machine, n.key));
+  }
+
+  /// Declared numbers and where the piece lies were fitted beside what is not told: anew, without.
+  void fit_what_is_told() {
+    LinearPart linear = without(found().nuisances, put_back_);
+    const Column residual = evidence_.residual(evidence_.predict(d_.found));
+    const Ground ground(evidence_, residual, linear);
+    const Eigen::VectorXd step =
+        linear_step(ground.grams.fitted, ground.grams.held_out, ground.precision, ground.offset)
+            .step;
+    for (std::size_t i = 0; i < linear.numbers.size(); ++i)
+      linear.numbers[i].value +=
+          step[static_cast<Eigen::Index>(i)] * linear.numbers[i].number.typical;
+    d_.found = with(d_.found, linear.numbers);
+    told_held_out_ =
+        evidence_.chi2(evidence_.residual(evidence_.predict(d_.found)), Role::held_out);
   }
 
   void tell_slip() {
@@ -456,7 +475,8 @@ class Report {
     if (!evidence_.noise().from_repetitions || !before_.chatter.empty()) return;
     const std::vector<double> before = evidence_.rms_within_laps(evidence_.predict(of_.declared),
                                                                  Role::held_out),
-                              after = evidence_.rms_within_laps(found().prediction, Role::held_out);
+                              after = evidence_.rms_within_laps(evidence_.predict(d_.found),
+                                                                Role::held_out);
     for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c) {
       const double n = evidence_.count(c, Role::held_out);
       if (n < kFewSamples) continue;
@@ -587,8 +607,7 @@ class Report {
         excess(beforehand ? evidence_.chi2(evidence_.residual(evidence_.predict(of_.declared)),
                                            Role::held_out)
                           : selection_.base.held_out);
-    const FittedMachine& kept = withdrawn_ ? selection_.base : found();
-    const double after = excess(kept.held_out);
+    const double after = excess(withdrawn_ ? selection_.base.held_out : told_held_out_);
     const double ratio = 1 + after / std::max(1.0, floor_);
     // A piece that lies elsewhere is no fault of the machine.
     const bool named = std::any_of(d_.effects.begin(), d_.effects.end(), is_of_machine);
@@ -629,7 +648,9 @@ class Report {
   double floor_;
   bool inexact_;            ///< the model is known not to be the machine
   bool still_off_ = false;  ///< some signal is, by more than a model of the cause may be wrong by
-  bool withdrawn_ = false;
+  bool withdrawn_ = false, withheld_ = false;
+  double told_held_out_ = selection_.found.held_out;  ///< chi-square that what is told leaves
+  std::vector<FreedNumber> put_back_;                 ///< released numbers that are not told
   Diagnosis d_;
 };
 
