@@ -120,16 +120,26 @@ struct MachineReplica::Hypothesis {
   Machine actual;                    ///< with its deviations applied
   PerAxis<std::string> drive, axis;  ///< fingerprints, without and with displacements
   std::string contact;               ///< without the axes
-  std::string ball, sensing;
+  std::string ball, sensing, only_in_full;
 };
 
 struct MachineReplica::Anchor {
   Anchor(const Hypothesis& h, const AxisReplays& axes)
-      : contact(h.contact), ball(h.ball), sensing(h.sensing), poses(h.actual, axes) {}
+      : contact(h.contact),
+        ball(h.ball),
+        sensing(h.sensing),
+        only_in_full(h.only_in_full),
+        lifts(vcnc::lifts(h.actual)),
+        poses(h.actual, axes) {}
 
-  std::string contact, ball, sensing;
+  /// Whether the probe of a machine is computed in full.
+  bool needs_full(const Hypothesis& h) const {
+    return lifts || vcnc::lifts(h.actual) || h.only_in_full != only_in_full;
+  }
+
+  std::string contact, ball, sensing, only_in_full;
+  bool lifts;
   NearbyPoses poses;
-  bool needs_full = false;
   ProbeReplay full;
   Deflections off_record;
   Deflections ball_offset;     ///< full less quick
@@ -182,6 +192,7 @@ MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine,
     h.ball += h.axis[axis];
   }
   h.sensing = fingerprint_of_sensing(h.actual);
+  h.only_in_full = fingerprint_of_full_probe(h.actual);
   return h;
 }
 
@@ -246,11 +257,10 @@ bool MachineReplica::anchor(const Machine& machine) {
     quick = replay_contact(h.actual, piece_.get(),
                            {anchor->poses, anchor->poses.poses(), anchor->poses.axes()});
   });
-  anchor->needs_full = needs_full_probe(h.actual);
   anchor->off_record = off_record(full.reading);
   anchor->ball_offset = sum(full.ball, quick, -1);
   anchor->reading_offset = sum(full.reading, replay_sensing(h.actual, full.ball, axes), -1);
-  anchor->reading = signals_err(h.actual) && !anchor->needs_full
+  anchor->reading = signals_err(h.actual) && !anchor->needs_full(h)
                         ? sum(replay_sensing(h.actual, full.ball, axes, &anchor->off_record),
                               anchor->reading_offset, 1)
                         : full.reading;
@@ -264,8 +274,7 @@ bool MachineReplica::anchor(const Machine& machine) {
 
 Deflections MachineReplica::reading_of(const Hypothesis& h, const AxisReplays& axes) const {
   if (h.ball == anchor_->ball && h.sensing == anchor_->sensing) return anchor_->reading;
-  if (anchor_->needs_full || needs_full_probe(h.actual))
-    return replay_probe(h.actual, piece_.get(), axes).reading;
+  if (anchor_->needs_full(h)) return replay_probe(h.actual, piece_.get(), axes).reading;
   const Deflections ball = sum(*ball_of(h, axes), anchor_->ball_offset, 1);
   // Where in their period the signals are is known from the record, wherever the ball is held to
   // be.
@@ -374,7 +383,7 @@ std::vector<Prediction> MachineReplica::predict_all(const std::vector<Machine>& 
     for (std::size_t i = 0; i < all.size(); ++i) {
       const Hypothesis& h = all[i];
       // The probe in full asks for the whole truth.
-      const bool in_full = probes_ && (anchor_->needs_full || needs_full_probe(h.actual));
+      const bool in_full = probes_ && anchor_->needs_full(h);
       axes[i][axis] = in_full ? axis_memory_[axis]->find_or_make(h.axis[axis],
                                                                  [&] { return replayed(h, axis); })
                               : axis_memory_[axis]->find(h.axis[axis]);

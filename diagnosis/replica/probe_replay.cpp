@@ -132,6 +132,16 @@ class CoarseContact {
   double clearance_ = 0;
 };
 
+bool corrects_signals(const Machine& actual) {
+  return actual.probe.correction == ProbeParams::Correction::heydemann;
+}
+
+/// Those that nobody corrects.
+Chain<AnaloguePort> signal_errors(const Machine& actual) {
+  if (corrects_signals(actual)) return {};
+  return machine_chain<AnaloguePort>(actual.effects, kSeed);
+}
+
 /// Adds the effects of one stage.
 void add_effects(Fingerprint& print, const Machine& actual, EffectStage stage) {
   for_each_effect_of(actual.effects, [&]<class Effect>(const Effect& effect, std::size_t axis) {
@@ -238,7 +248,7 @@ Deflections replay_contact(const Machine& actual, const Piece* piece, NearbyPose
 Deflections replay_sensing(const Machine& actual, const Deflections& ball, const AxisReplays& axes,
                            const Deflections* moved) {
   Chain<DeflectionPort> feeling = machine_chain<DeflectionPort>(actual.effects, kSeed);
-  Chain<AnaloguePort> signals = machine_chain<AnaloguePort>(actual.effects, kSeed);
+  Chain<AnaloguePort> signals = signal_errors(actual);
   Chain<ReadingPort> counting = machine_chain<ReadingPort>(actual.effects, kSeed);
   if (feeling.empty() && signals.empty() && counting.empty()) return ball;
   const double period = actual.probe.signal_period;
@@ -271,13 +281,19 @@ Deflections replay_sensing(const Machine& actual, const Deflections& ball, const
   return reading;
 }
 
-bool signals_err(const Machine& actual) {
-  return !machine_chain<AnaloguePort>(actual.effects, kSeed).empty();
-}
+bool signals_err(const Machine& actual) { return !signal_errors(actual).empty(); }
 
-bool needs_full_probe(const Machine& actual) {
-  return !actual.effects.get<ContactLoss>().null() || !actual.effects.get<ReturnToZero>().null() ||
-         (actual.probe.correction == ProbeParams::Correction::heydemann && signals_err(actual));
+bool lifts(const Machine& actual) { return !actual.effects.get<ContactLoss>().null(); }
+
+std::string fingerprint_of_full_probe(const Machine& actual) {
+  Fingerprint print;
+  for_each_effect_of(actual.effects, [&]<class Effect>(const Effect& effect, std::size_t axis) {
+    if (effect.null()) return;
+    if (std::is_same_v<Effect, ReturnToZero> ||
+        (std::is_same_v<typename Effect::Port, AnaloguePort> && corrects_signals(actual)))
+      add_effect(print, effect, axis);
+  });
+  return print.bytes();
 }
 
 bool poses_follow_dynamics(const Machine& actual) {

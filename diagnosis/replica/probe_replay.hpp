@@ -94,12 +94,16 @@ Deflections replay_contact(const Machine& actual, const Piece* piece, NearbyPose
 Deflections replay_sensing(const Machine& actual, const Deflections& ball, const AxisReplays& axes,
                            const Deflections* moved = nullptr);
 
-/// What only the full probe tells: the piece that is lifted, the hysteresis of the guides, whose
-/// friction depends on the sliding within a cycle, and effects on signals that are corrected
-/// online.
-bool needs_full_probe(const Machine& actual);
+/// A piece that is lifted now and then: any difference is only known in full.
+bool lifts(const Machine& actual);
 
-/// Whether some effect makes errors of the sin/cos signals, which repeat with their period.
+/// What only the full probe tells: the hysteresis of the guides, whose friction depends on the
+/// sliding within a cycle, and effects on signals that are corrected online. The quick one leaves
+/// it out, so it tells differences between machines that agree in this.
+std::string fingerprint_of_full_probe(const Machine& actual);
+
+/// Whether some effect makes errors of the sin/cos signals that stay in the reading and repeat with
+/// their period.
 bool signals_err(const Machine& actual);
 
 /// Whether errors of the geometry follow the axes' accelerations, or remember: then those near

@@ -110,6 +110,7 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
     ChannelNoise& channel = noise_.channels[c];
     const double louder = c < form_.size() ? std::hypot(1, form_[c] / channel.rms) : 1;
     channel.filter.scale *= noise_scale_ * louder;
+    channel.once.scale *= noise_scale_ * louder;
     channel.of_laps /= louder * louder;
   }
   count_valid();
@@ -160,7 +161,8 @@ void Evidence::count_valid() {
   held_out_count_.clear();
   for (std::size_t c = 0; c < raw_valid_.size(); ++c) {
     valid_.emplace_back(record_.samples(), 0);
-    const std::size_t order = noise_.channels[c].filter.a.size();
+    const ChannelNoise& noise = noise_.channels[c];
+    const std::size_t order = std::max(noise.filter.a.size(), noise.once.a.size());
     fitted_count_.push_back(0);
     held_out_count_.push_back(0);
     for (const Block& block : partition_.blocks) {
@@ -230,26 +232,29 @@ std::vector<Prediction> Evidence::predict_all(const std::vector<Machine>& hypoth
 
 std::vector<float> Evidence::whiten(std::size_t channel, const std::vector<double>& series) const {
   constexpr std::size_t kAtATime = 256;
-  const WhiteningFilter& filter = noise_.channels[channel].filter;
+  const ChannelNoise& noise = noise_.channels[channel];
   const std::vector<char>& valid = valid_[channel];
-  const double per_scale = 1 / filter.scale;
   std::vector<float> z(series.size(), 0.0F);
   double v[kAtATime];
-  for (std::size_t k = 0; k < series.size();) {
-    if (!valid[k]) {
-      ++k;
-      continue;
+  for (const Block& block : partition_.blocks) {
+    const WhiteningFilter& filter = block.once ? noise.once : noise.filter;
+    const double per_scale = 1 / filter.scale;
+    for (std::size_t k = block.begin; k < block.end;) {
+      if (!valid[k]) {
+        ++k;
+        continue;
+      }
+      std::size_t n = 1;
+      while (n < kAtATime && k + n < block.end && valid[k + n]) ++n;
+      std::copy_n(&series[k], n, v);
+      for (std::size_t j = 0; j < filter.a.size(); ++j) {
+        const double a = filter.a[j];
+        const double* const before = &series[k - 1 - j];
+        for (std::size_t i = 0; i < n; ++i) v[i] -= a * before[i];
+      }
+      for (std::size_t i = 0; i < n; ++i) z[k + i] = static_cast<float>(v[i] * per_scale);
+      k += n;
     }
-    std::size_t n = 1;
-    while (n < kAtATime && k + n < series.size() && valid[k + n]) ++n;
-    std::copy_n(&series[k], n, v);
-    for (std::size_t j = 0; j < filter.a.size(); ++j) {
-      const double a = filter.a[j];
-      const double* const before = &series[k - 1 - j];
-      for (std::size_t i = 0; i < n; ++i) v[i] -= a * before[i];
-    }
-    for (std::size_t i = 0; i < n; ++i) z[k + i] = static_cast<float>(v[i] * per_scale);
-    k += n;
   }
   return z;
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <map>
 #include <numeric>
 #include <unsupported/Eigen/FFT>
 
@@ -68,10 +70,14 @@ std::vector<LapNoise> lap_noise(const Partition& partition, const Series& residu
   return all;
 }
 
-/// The stretches as they are, less their straight lines; every other one is held out.
-std::vector<LapNoise> whole_laps(const Partition& partition, const Series& value) {
+/// The stretches as they are, or those that `which` takes, less their straight lines; every other
+/// one is held out.
+std::vector<LapNoise> whole_laps(
+    const Partition& partition, const Series& value,
+    const std::function<bool(const Stretch&)>& which = [](const Stretch&) { return true; }) {
   std::vector<LapNoise> all;
   for (const Stretch& s : partition.stretches) {
+    if (!which(s)) continue;
     LapNoise lap{Series(value.begin() + static_cast<std::ptrdiff_t>(s.begin),
                         value.begin() + static_cast<std::ptrdiff_t>(s.end)),
                  all.size() % 2 == 0};
@@ -181,6 +187,22 @@ std::vector<NoiseLine> find_lines(const ComparedChannel& channel, const std::vec
   return lines;
 }
 
+/// Of what was run once, with the covariances that are added to what is seen; `laps` where that is
+/// no noisier than those.
+WhiteningFilter filter_of_once(const Partition& partition, const Series& residual,
+                               const Series& added, const WhiteningFilter& laps, double of_laps) {
+  std::map<int, int> times;
+  for (const Stretch& s : partition.stretches) ++times[s.condition];
+  const std::vector<LapNoise> once =
+      whole_laps(partition, residual, [&](const Stretch& s) { return times[s.condition] == 1; });
+  Series covariance = covariances(once);
+  for (std::size_t j = 0; j < added.size(); ++j) covariance[j] += added[j];
+  if (!(covariance[0] > of_laps)) return laps;
+  WhiteningFilter filter = fit_autoregression(covariance);
+  filter.scale = std::max(filter.scale, std::sqrt(left_by(filter, once)));
+  return filter;
+}
+
 double resolution_of(const Record& record, const ComparedChannel& channel) {
   const MeasuredSignal* signal = record.find(channel.kind, channel.axis);
   return signal ? signal->resolution : 0;
@@ -242,10 +264,9 @@ NoiseAudit audit_noise(const Record& record, const Partition& partition,
     if (laps.empty()) laps = whole_laps(partition, residual[c]);
     Series covariance = covariances(laps);
     const double of_laps = covariance[0];
-    if (!rounding.empty()) {
-      const Series more = covariances(whole_laps(partition, rounding[c]));
-      for (std::size_t j = 0; j < more.size(); ++j) covariance[j] += more[j];
-    }
+    const Series of_rounding =
+        rounding.empty() ? Series() : covariances(whole_laps(partition, rounding[c]));
+    for (std::size_t j = 0; j < of_rounding.size(); ++j) covariance[j] += of_rounding[j];
     const double resolution = resolution_of(record, channels[c]);
     const double least = resolution * resolution / 12 +
                          exactness(channels[c], residual[c]) * exactness(channels[c], residual[c]);
@@ -259,6 +280,9 @@ NoiseAudit audit_noise(const Record& record, const Partition& partition,
     // Where the laps are quieter than the channel can be, what it can be counts.
     noise.filter.scale = std::sqrt(quiet || covariance[0] > of_laps ? expected : left);
     noise.of_laps = std::min(1.0, left / (noise.filter.scale * noise.filter.scale));
+    noise.once = partition.repeated ? filter_of_once(partition, residual[c], of_rounding,
+                                                     noise.filter, covariance[0])
+                                    : noise.filter;
     if (audit.from_repetitions) {
       const std::vector<NoiseLine> lines =
           find_lines(channels[c], laps, record.period, 0.1 * std::sqrt(least));

@@ -16,7 +16,9 @@
 //
 // A channel can never be quieter than its own step (q^2/12, Widrow 1956), nor than the replica is
 // exact. Without repetitions the filter is fitted to the residual itself: all it can predict from
-// its own past counts as noise, so that effects are underrated, not overrated.
+// its own past counts as noise, so that effects are underrated, not overrated. The same is done of
+// what was run once though other motions were repeated (the way to a circle and back), where that
+// differs from the model by more than the laps do from each other.
 #pragma once
 
 #include <optional>
@@ -50,7 +52,8 @@ struct NoiseLine {
 
 struct ChannelNoise {
   WhiteningFilter filter;
-  double rms = 0;  ///< of the noise [SI]
+  WhiteningFilter once;  ///< of what was run once; the same where that is no noisier
+  double rms = 0;        ///< of the noise [SI]
   /// Variance after the filter of what laps really differ by: 1, or less where the channel counts
   /// as noisier than that.
   double of_laps = 1;

@@ -69,7 +69,7 @@ Partition partition(const Record& record) {
       // What was run once is held out in pieces.
       const bool held_out = once ? singles++ % 2 == 1 : lap % 2 == of;
       p.blocks.push_back({s.begin + length * k / pieces, s.begin + length * (k + 1) / pieces, i,
-                          s.condition, held_out});
+                          s.condition, held_out, once});
     }
   }
   return p;

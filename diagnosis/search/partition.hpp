@@ -19,6 +19,7 @@ struct Block {
   std::size_t stretch = 0;         ///< index into the stretches of the partition
   int condition = 0;
   bool held_out = false;
+  bool once = false;  ///< run once, though others were repeated
 };
 
 struct Partition {

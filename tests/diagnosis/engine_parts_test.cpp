@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "diagnosis/search/contest.hpp"
 #include "diagnosis/search/generic_laws.hpp"
@@ -168,6 +169,37 @@ TEST(NoiseAudit, CountsWhatEncodersRoundOffThoughItRepeats) {
   EXPECT_NEAR(rms({}).rms, 30e-9, 1e-9);
   EXPECT_NEAR(rms({rounding}).rms, 50e-9, 1e-9);
   EXPECT_NEAR(rms({rounding}).filter.scale, 50e-9, 2e-9);
+}
+
+/// Nobody knows what repeats of it, so all that its own past foretells counts as noise.
+TEST(NoiseAudit, TakesWhatWasRunOnceForNoiseWhereItIsLouderThanTheLaps) {
+  Record record = toy::commands(2048, 4);
+  record.stretches.back().condition = 99;  // run once
+  const Stretch once = record.stretches.back();
+  std::vector<double> noise(record.samples()), drifting = noise, louder = noise;
+  for (std::size_t k = 0; k < noise.size(); ++k) {
+    const auto at = static_cast<double>(k);
+    const bool alone = k >= once.begin && k < once.end;
+    louder[k] = drifting[k] = noise[k] = 30e-9 * gaussian_noise(3, 0, k)[0];
+    if (alone) drifting[k] += 300e-9 * std::sin(2 * kPi * at / 700);
+    if (alone) louder[k] *= 3;
+  }
+  const std::vector<ComparedChannel> channels{{SignalKind::position, 0}};
+  const auto audited = [&](const std::vector<double>& residual) {
+    return audit_noise(record, partition(record), channels, {residual}).channels[0];
+  };
+  const ChannelNoise quiet = audited(noise), of_drift = audited(drifting), loud = audited(louder);
+  EXPECT_NEAR(quiet.filter.scale, 30e-9, 2e-9);
+  EXPECT_NEAR(quiet.once.scale, 30e-9, 2e-9);
+  EXPECT_NEAR(loud.filter.scale, 30e-9, 2e-9);
+  EXPECT_NEAR(loud.once.scale, 90e-9, 6e-9);
+  // A constant that stays off by 300 nm counts for less than 3 % of what it would beside the laps.
+  const auto of_constant = [](const WhiteningFilter& f) {
+    return std::abs(1 - std::accumulate(f.a.begin(), f.a.end(), 0.0)) / f.scale;
+  };
+  EXPECT_LT(std::pow(of_constant(of_drift.once) / of_constant(of_drift.filter), 2), 0.03);
+  for (const Block& block : partition(record).blocks)
+    EXPECT_EQ(block.once, block.begin >= once.begin && block.end <= once.end);
 }
 
 TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {

@@ -191,6 +191,51 @@ TEST(MachineReplica, SignalErrorsAreThoseOfTheDeflectionThatWasMeasured) {
   EXPECT_GT(std::sqrt(off_elsewhere / size), 0.4);
 }
 
+/// What only the full probe tells need not be computed again where both machines have it.
+TEST(MachineReplica, HysteresisAndCorrectedSignalsAreThoseOfTheAnchor) {
+  Effects effects;
+  effects.get<ReturnToZero>() = {0.5e-6};
+  effects.get<SignalGain>() = SignalGain::nominal();
+  Experiment e = experiment(Showing::circle, kX, ideal_machine());
+  e.machine.probe.correction = ProbeParams::Correction::heydemann;
+  e.machine.effects = effects;
+  const Observation seen = observe(e);
+  RunBegin begin;
+  begin.run_id = "test";
+  begin.declared_toml = to_toml(e.machine);
+  begin.piece_toml = to_toml(*e.piece);
+  const Record record = record_from(begin, seen.rows, seen.alarms);
+  const MachineReplica replica(record, e.machine, e.piece);
+  // Sizes of what a machine makes of the readings, and of what is wrong about that [m].
+  const auto change = [&](const Machine& machine) {
+    const Prediction before = replica.predict_in_full(e.machine),
+                     full = replica.predict_in_full(machine), quick = replica.predict(machine);
+    double size = 0, off = 0;
+    for (std::size_t c = 0; c < full.size(); ++c)
+      for (std::size_t k = 0; k < full[c].size(); ++k) {
+        if (replica.channels()[c].kind != SignalKind::deflection) continue;
+        size += std::pow(full[c][k] - before[c][k], 2);
+        off += std::pow(quick[c][k] - full[c][k], 2);
+      }
+    return std::pair(std::sqrt(size), std::sqrt(off));
+  };
+  Machine moved = e.machine;
+  moved.effects.get<PieceOffset>() = {Vec3(2e-6, 1e-6, 0)};
+  moved.effects.axis[kX].get<ScaleError>() = ScaleError::nominal();
+  const auto [size, off] = change(moved);
+  EXPECT_GT(size, 1e-6);
+  EXPECT_LT(off, 0.03 * size);
+  for (const bool signals : {false, true}) {  // another one of these is computed in full
+    Machine other = e.machine;
+    if (signals)
+      other.effects.get<SignalGain>() = {};
+    else
+      other.effects.get<ReturnToZero>() = {1e-6};
+    EXPECT_GT(change(other).first, 0);
+    EXPECT_EQ(change(other).second, 0);
+  }
+}
+
 TEST(MachineReplica, ChanceIsNotPredicted) {
   const RecordedRun& run = reversals();
   const MachineReplica replica = run.replica();
