@@ -14,6 +14,9 @@ namespace {
 constexpr double kShift = 10e-6;  // of a piece, to see what one does [m]
 /// Times what encoders were reckoned to make of a reading that they may make of it.
 constexpr double kUnderrated = 2;
+/// Times what encoders usually make of a signal, or laps differ by, from which on they decide what
+/// an axis does; and how long before and after.
+constexpr double kDecided = 6, kDecidedReach = 0.02;  // [s]
 
 /// sum of a b, in doubles and several at a time.
 double dot(const float* a, const float* b, std::size_t n) {
@@ -37,6 +40,17 @@ std::vector<double> rms_of_all(const SeriesOfChannels& series) {
     rms.push_back(n > 0 ? std::sqrt(sum / n) : 0);
   }
   return rms;
+}
+
+/// Standard deviation by the median of the sizes, which few large ones do not change.
+double usual_size(const std::vector<double>& series) {
+  std::vector<double> sizes;
+  for (const double v : series)
+    if (std::isfinite(v)) sizes.push_back(std::abs(v));
+  if (sizes.empty()) return 0;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return 1.4826 * *middle;
 }
 
 /// Whose readings say where the ball is.
@@ -104,7 +118,10 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
 }
 
 void Evidence::reckon_with_rounding(const Machine& machine) {
-  const SeriesOfChannels rounding = rounding_of(machine);
+  SeriesOfChannels rounding = rounding_of(machine);
+  leave_out_what_rounding_decides(rounding);
+  mask(rounding);
+  mask(difference_);
   noise_ = audit_noise(record_, partition_, replica_.channels(), difference_, rounding);
   for (std::size_t c = 0; c < noise_.channels.size(); ++c) {
     ChannelNoise& channel = noise_.channels[c];
@@ -153,6 +170,21 @@ void Evidence::leave_out(const std::vector<LapEvent>& events) {
         std::fill(raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(e.begin),
                   raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(e.end), 0);
     }
+}
+
+void Evidence::leave_out_what_rounding_decides(const SeriesOfChannels& rounding) {
+  const auto reach = static_cast<std::size_t>(kDecidedReach / record_.period);
+  for (std::size_t c = 0; c < rounding.size(); ++c) {
+    const std::vector<double>& x = rounding[c];
+    const double usual =
+        std::max(usual_size(x), lap_scatter(partition_, difference_[c]).value_or(0));
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      if (!(std::abs(x[k]) > kDecided * usual)) continue;
+      const std::size_t begin = k > reach ? k - reach : 0, end = std::min(x.size(), k + reach + 1);
+      std::fill(raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(begin),
+                raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(end), 0);
+    }
+  }
 }
 
 void Evidence::count_valid() {
@@ -375,6 +407,10 @@ std::vector<double> Evidence::rms_within_laps(const Prediction& prediction, Role
     for (std::size_t k = 0; k < off[c].size(); ++k) off[c][k] -= prediction[c][k];
   mask(off);
   if (!per_shift_.empty()) take_out_shifts(partition_.stretches, per_shift_, off, Shifts::constant);
+  for (const Block& block : partition_.blocks)
+    for (std::size_t c = 0; block.once && c < off.size(); ++c)
+      std::fill(off[c].begin() + static_cast<std::ptrdiff_t>(block.begin),
+                off[c].begin() + static_cast<std::ptrdiff_t>(block.end), kMissing);
   std::vector<double> all;
   for (std::size_t c = 0; c < off.size(); ++c) all.push_back(rms_of(off[c], c, role));
   return all;

@@ -8,8 +8,9 @@
 // Shifts of the piece from lap to lap, as large as the rounding of encoders makes them, are
 // whitened in addition (lap_shifts.hpp).
 //
-// Only samples that can be compared count (comparable.hpp), none outside every stretch, and not
-// what an axis does in one lap and not in another (lap_events.hpp).
+// Only samples that can be compared count (comparable.hpp), none outside every stretch, not what an
+// axis does in one lap and not in another (lap_events.hpp), and not moments at which the rounding
+// of an encoder decides what an axis does (whether friction holds it here or a little further).
 #pragma once
 
 #include <Eigen/Dense>
@@ -128,7 +129,7 @@ class Evidence {
   double rms(const Prediction& prediction, std::size_t channel, Role role) const;
 
   /// Of every channel, less what shifts of the piece, other ones in every lap, make of the
-  /// readings.
+  /// readings; where motions were repeated, of those alone.
   std::vector<double> rms_within_laps(const Prediction& prediction, Role role) const;
 
   /// Products of all pairs of the columns, per block.
@@ -152,6 +153,7 @@ class Evidence {
   std::vector<SeriesOfChannels> readings_per_shift(const std::vector<Machine>& shifted) const;
   SeriesOfChannels rounding_of(const Machine& machine) const;
   void leave_out(const std::vector<LapEvent>& events);
+  void leave_out_what_rounding_decides(const SeriesOfChannels& rounding);
   void count_valid();
   void whiten_shifts(const Eigen::Vector3d& shift);
   /// Says nothing of samples that cannot be compared.

@@ -71,7 +71,9 @@ std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vect
   return to;
 }
 
-constexpr double kNoStep = 1;  ///< chi-square that no step is worth
+constexpr double kNoStep = 1;         ///< chi-square that no step is worth
+constexpr double kBetter = 0.1;       ///< of what a step promises, that it may do better by
+constexpr double kFarthestStep = 64;  ///< times what sensitivities tell
 
 /// Goes as far towards a refit as makes the misfit smaller: sensitivities are not everywhere what
 /// they are where they were taken. False: not a step.
@@ -80,16 +82,33 @@ bool step_towards(const Evidence& evidence, FittedMachine& m, const Refit& f,
   if (least - f.fitted < kNoStep) return false;
   std::vector<FreedNumber> old = m.nuisances.numbers;
   for (const FreedNumber& n : m.numbers()) old.push_back(n);
-  for (const double share : {1.0, 0.5, 0.2, 0.05}) {
+  const auto at = [&](double share) {
     Refit part = f;
     part.linear = between(old, f.linear, share);
     part.live = between(old, f.live, share);
     part.machine = with(with(m.machine, part.live), part.linear);
     FittedMachine trial = m;
     settle(evidence, trial, part);
-    const double now = misfit(evidence, trial.residual, weight, trial.nuisances.numbers);
+    return trial;
+  };
+  const auto misfit_of = [&](const FittedMachine& trial) {
+    return misfit(evidence, trial.residual, weight, trial.nuisances.numbers);
+  };
+  for (const double share : {1.0, 0.5, 0.2, 0.05}) {
+    FittedMachine trial = at(share);
+    double now = misfit_of(trial);
     if (now > least && now - least < kNoStep) return false;
     if (!(now < least)) continue;
+    // What is rough about the sensitivities makes steps too short: where one does better than it
+    // promised, one goes on.
+    const bool better = f.fitted - now > kNoStep + kBetter * (least - f.fitted);
+    for (double more = 2; share == 1.0 && better && more <= kFarthestStep; more *= 2) {
+      FittedMachine farther = at(more);
+      const double then = misfit_of(farther);
+      if (then > now - kNoStep) break;
+      trial = std::move(farther);
+      now = then;
+    }
     m = std::move(trial);
     return true;
   }
@@ -162,13 +181,14 @@ void converge_exactly(Evidence& evidence, FittedMachine& m) {
 /// would, if gains go on to shrink as they do; `gain` is that of the fit before.
 void fit_in_rounds(Evidence& evidence, FittedMachine& m, const std::vector<std::size_t>& which,
                    double gain = std::numeric_limits<double>::infinity()) {
-  constexpr int kLinearisations = 3;
+  constexpr int kLinearisations = 8;
   for (int round = 0; round < kLinearisations; ++round) {
     const double before = m.held_out, last = gain;
     linearise(evidence, m, which);
     converge_exactly(evidence, m);
     gain = before - m.held_out;
-    const double next = last > 0 && std::isfinite(last) ? gain * gain / last : gain;
+    const double next =
+        last > 0 && std::isfinite(last) ? gain * std::sqrt(std::abs(gain) / last) : gain;
     if (std::min(gain, next) < settled(evidence, m)) break;
   }
 }

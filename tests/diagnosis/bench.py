@@ -4,7 +4,8 @@
     bench.py VCNC [--parts independent,own] [--seed N] [--kinds clean=8,single=40,...] [--work DIR]
              [--jobs 2] [--markdown FILE] [--bounds NAME]
 
-Part `own`: recordings of the virtual machine itself (vcnc run --inject), against the declared model.
+Part `own`: recordings of the virtual machine itself (vcnc run --inject), against the declared model. Part `measured`: the
+same of configs/machines/trunnion_measured.toml, with its play, stick-slip, encoder steps and a probe whose signals are corrected.
 Part `independent`: tables of the generator in generator/, which shares no code, friction law, integrator,
 loop rates, kinematics or noise with vcnc; differential, the piece clamped anew and the machine at another
 thermal state between the healthy run and the test. Part `independent_absolute`: the same without the healthy run,
@@ -45,6 +46,7 @@ STOPS_AT_ONCE = {"contact_loss"}  # the NC unit's own check of the readings stop
 FOUND_BEFOREHAND = {"period_slip"}  # before anything is fitted: nothing to suspect
 SET_UP = {"piece_offset", "piece_tilt"}  # clamped anew for every run: never a finding
 S_PIECE = HERE.parents[1] / "configs/pieces/s_eq1.toml"
+MEASURED = HERE.parents[1] / "configs/machines/trunnion_measured.toml"
 MODEL = "found.toml"  # what a diagnosis calls the machine it found
 WHOLE = {"periods", "channel", "delay_cycles", "lobes", "harmonic", "order"}
 
@@ -106,23 +108,41 @@ def library(vcnc):
     return {e["name"]: e for e in json.loads(text)["effects"]}
 
 
-def declared_number(key):
-    values = tomllib.loads(files.machine_toml())
+def own_machine():
+    noise = "".join(f"[effects.{a}.encoder_quantisation]\nquantum_{'arcsec' if r else 'nm'} = {0.02 if r else 20}\n"
+                    for a, r in zip(machine.AXES, files.ROTARY))
+    return files.machine_toml() + noise + "[effects.probe.adc_noise]\nnoise_mV = 5\n"
+
+
+def measured_machine():
+    """As it is shipped, but for the piece and where it lies."""
+    ours = files.machine_toml()
+    begin, end = ours.index("[setup]"), ours.index("\n[", ours.index("[setup]"))
+    text = MEASURED.read_text()
+    old = text.index("[setup]")
+    return text[:old] + ours[begin:end] + text[text.index("\n[", old):]
+
+
+OWN = {"own": own_machine, "measured": measured_machine}
+
+
+def declared_number(declared, key):
+    values = declared
     for part in key.split("."):
         values = values[part] if isinstance(values, dict) and part in values else None
     return values
 
 
-def draw_own(rng, entry):
+def draw_own(rng, entry, declared):
     """An effect of the library at one of its places, sizes within a factor of three about the typical one."""
     place = entry["places"][rng.integers(len(entry["places"]))]
     factor, sign = 3 ** rng.uniform(-1, 1), rng.choice([-1.0, 1.0])
     parameters, assignments = {}, []
     for p in place["parameters"]:
         short, nominal, default = p["key"].rsplit(".", 1)[1], p["nominal"], p["default"]
-        held = declared_number(p["key"])
+        held = declared_number(declared, p["key"])
         if held is not None:
-            value = held * (1 + sign * min(0.4 * factor / 3, 0.6)) if not parameters else held
+            value = (np.asarray(held) * (1 + sign * min(0.4 * factor / 3, 0.6))).tolist() if not parameters else held
         elif short.startswith("phase"):
             value = float(rng.uniform(-180, 180))
         elif short == "start_s":
@@ -141,17 +161,15 @@ def draw_own(rng, entry):
     return {"name": entry["name"], "place": place["place"], "parameters": parameters}, assignments
 
 
-def set_up(rng):
+def set_up(rng, declared):
     """Tolerances of an individual and how the piece is clamped, as assignments."""
     out = [("effects.setup.piece_offset.shift_um", (5 * rng.standard_normal(3)).tolist()),
            ("effects.setup.piece_tilt.tilt_urad", (20 * rng.standard_normal(3)).tolist())]
-    for i, axis in enumerate(machine.AXES):
-        unit = "kgm2" if files.ROTARY[i] else "kg"
-        out.append((f"axes.{axis}.load_{unit}", machine.DECLARED["load"][i] * (1 + 0.01 * rng.standard_normal())))
-        level = "level_Nm" if files.ROTARY[i] else "level_N"
-        out.append((f"effects.{axis}.coulomb.{level}", machine.DECLARED["coulomb"][i] * (1 + 0.03 * rng.standard_normal())))
-        b = "coefficient_Nms_per_rad" if files.ROTARY[i] else "coefficient_Ns_per_m"
-        out.append((f"effects.{axis}.viscous.{b}", machine.DECLARED["viscous"][i] * (1 + 0.05 * rng.standard_normal())))
+    for axis, rotary in zip(machine.AXES, files.ROTARY):
+        for key, tolerance in ((f"axes.{axis}.load_{'kgm2' if rotary else 'kg'}", 0.01),
+                               (f"effects.{axis}.coulomb.level_{'Nm' if rotary else 'N'}", 0.03),
+                               (f"effects.{axis}.viscous.coefficient_{'Nms_per_rad' if rotary else 'Ns_per_m'}", 0.05)):
+            out.append((key, declared_number(declared, key) * (1 + tolerance * rng.standard_normal())))
     return out
 
 
@@ -163,7 +181,7 @@ def leave_out(s, entries):
     s["law_axes"] = [effect["place"]] if effect["place"] in machine.AXES else list(machine.AXES)
 
 
-def own_scenarios(rng, counts, entries):
+def own_scenarios(rng, counts, entries, declared):
     names = sorted(set(entries) - NOT_REPEATABLE - BEFORE_THE_COMMAND - STOPS_AT_ONCE - SET_UP)
     order, out = [], []
     for kind, count in counts.items():
@@ -179,9 +197,9 @@ def own_scenarios(rng, counts, entries):
                 if name not in chosen and not (kind == "without" and name in generate.NEVER_LEFT_OUT):
                     chosen.append(name)
             s = {"kind": kind, "effects": [], "values": {}, "number": len(out)}
-            assignments = dict(set_up(rng))
+            assignments = dict(set_up(rng, declared))
             for name in chosen:
-                effect, values = draw_own(rng, entries[name])
+                effect, values = draw_own(rng, entries[name], declared)
                 s["effects"].append(effect)
                 assignments.update(values)
                 s["values"].update(generate.by_component(values))
@@ -212,14 +230,12 @@ def own_run(vcnc, work, s, per_shift):
     return row | transfer(vcnc, work, s, row, per_shift)
 
 
-def own_part(vcnc, work, seed, counts, jobs):
+def own_part(vcnc, work, seed, counts, jobs, declared):
     write_inputs(work)
-    noise = "".join(f"[effects.{a}.encoder_quantisation]\nquantum_{'arcsec' if r else 'nm'} = {0.02 if r else 20}\n"
-                    for a, r in zip(machine.AXES, files.ROTARY))
-    (work / "own.toml").write_text(files.machine_toml() + noise + "[effects.probe.adc_noise]\nnoise_mV = 5\n")
+    (work / "own.toml").write_text(declared)
     subprocess.run([vcnc, "program", "s-piece", "--machine", str(work / "own.toml"), "--set", f"setup.piece={S_PIECE}",
                     "--feed-mm-min", "2000", "--out", str(work / "s.ngc")], check=True, capture_output=True)
-    drawn = own_scenarios(np.random.default_rng(seed), counts, library(vcnc))
+    drawn = own_scenarios(np.random.default_rng(seed), counts, library(vcnc), tomllib.loads(declared))
     for s in drawn:
         number = s["number"]
         print(f"own answer_{number} {files.write_answer(work / f'own_answer_{number}.json', s)}", flush=True)
@@ -418,6 +434,8 @@ are written, and their SHA-256 printed, before anything is diagnosed; every run 
 * **independent_absolute**: the same tests without the healthy run, against the declared model as `vcnc commission` has fitted it to that.
 * **own**: the virtual machine itself as the generator (`vcnc run --inject`), against the declared model: an easy setting, since
   friction law and controller are the diagnosis' own.
+* **measured**: the same of the machine `configs/machines/trunnion_measured.toml` as it is shipped: play, stick-slip, encoder steps of 10 nm, and a
+  probe with hysteresis and signals that are corrected while it measures.
 * *left out*, in either part: the effect is injected and taken out of the library (`vcnc diagnose --without`).
 * **shuffled**: what the first single tests differ from their reference, lap by lap, moved to laps of other conditions. Nothing may be found.
 
@@ -501,15 +519,15 @@ def main():
     for part in a.parts:
         print(f"== {part}", flush=True)
         folder = work / part.split("_")[0]
-        if part == "own":
-            parts[part] = own_part(a.vcnc, folder, a.seed, a.kinds, a.jobs)
+        if part in OWN:
+            parts[part] = own_part(a.vcnc, folder, a.seed, a.kinds, a.jobs, OWN[part]())
         elif part in ("independent", "independent_absolute"):
             parts[part] = independent_part(a.vcnc, folder, a.seed, a.kinds, a.jobs, a.individuals, part.endswith("absolute"),
                                            a.numbers)
         elif part == "shuffled":
             parts[part] = shuffled_part(a.vcnc, work / "independent", a.seed, 1)
         else:
-            sys.exit(f"unknown part {part}: own, independent, independent_absolute, shuffled")
+            sys.exit(f"unknown part {part}: {', '.join(OWN)}, independent, independent_absolute, shuffled")
         good = [r for r in parts[part] if "failed" not in r]
         for k, v in (grading.summary(good) if good else {}).items():
             print(f"  {k}: {v}")

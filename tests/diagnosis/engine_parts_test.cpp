@@ -202,6 +202,60 @@ TEST(NoiseAudit, TakesWhatWasRunOnceForNoiseWhereItIsLouderThanTheLaps) {
     EXPECT_EQ(block.once, block.begin >= once.begin && block.end <= once.end);
 }
 
+/// Its encoder rounds by 5 nm; at one place of every lap that decides where it comes to rest.
+class RoundingReplica : public toy::ToyReplica {
+ public:
+  using ToyReplica::ToyReplica;
+  std::vector<std::vector<double>> rounding(const Machine& m) const override {
+    const std::size_t samples = predict(m)[0].size();
+    std::vector<std::vector<double>> all(3, std::vector<double>(samples, 0.0));
+    for (std::size_t k = 0; k < samples; ++k)
+      all[0][k] = k % 2048 >= 500 && k % 2048 < 530 ? 2e-6 : 5e-9 * gaussian_noise(9, 0, k)[0];
+    return all;
+  }
+};
+
+TEST(Evidence, LeavesOutWhatRoundingDecides) {
+  Record record = toy::commands(2048, 4);
+  toy::measure(record, Machine(), 5);
+  toy::ToyReplica exact(record);
+  RoundingReplica rounding(record);
+  const Evidence all(record, exact, Machine()), some(record, rounding, Machine());
+  const double laps = 12, each = 30 + 2 * 20;  // ms: before and after, too
+  const double gone = all.count(0, Role::both) - some.count(0, Role::both);
+  EXPECT_GE(gone, laps * each);
+  EXPECT_LE(gone, laps * (each + kWhiteningOrder));
+  EXPECT_EQ(all.count(1, Role::both), some.count(1, Role::both));
+  // What is left of it counts as noise.
+  EXPECT_NEAR(some.noise().channels[0].rms, std::hypot(all.noise().channels[0].rms, 5e-9), 1e-9);
+}
+
+/// Its forces change with any number a little as by chance, as those of an axis that is held by
+/// friction here or there.
+class RoughReplica : public toy::ToyReplica {
+ public:
+  using ToyReplica::ToyReplica;
+  Prediction predict(const Machine& m) const override {
+    Prediction all = ToyReplica::predict(m);
+    std::vector<double> force(all[1].begin(), all[1].end());
+    const auto seed = static_cast<std::uint64_t>(1e6 * number_of(m, "axes.X.load_kg"));
+    for (std::size_t k = 0; k < force.size(); ++k) force[k] += 1.5 * gaussian_noise(seed, 0, k)[0];
+    all[1] = std::move(force);
+    return all;
+  }
+};
+
+TEST(FittedMachine, GoesFartherWhereRoughSensitivitiesMakeStepsShort) {
+  Record record = toy::commands(2048, 4);
+  Machine truth;
+  move_number(truth, "axes.X.load_kg", 515);  // three tolerances
+  toy::measure(record, truth, 5);
+  RoughReplica replica(record);
+  Evidence evidence(record, replica, Machine());
+  const FittedMachine m = fit_declared(evidence, Machine());
+  EXPECT_NEAR(number_of(m.machine, "axes.X.load_kg"), 515, 1);
+}
+
 TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {
   DiagnosisOptions options;
   options.share_of_found = 0.01;
