@@ -100,6 +100,7 @@ DiagnosisOptions fitting(DiagnosisOptions options, const Evidence& evidence,
   } else if (!left.empty()) {
     allow_for_form(evidence, left, options);
   }
+  options.rounding_of_channel = evidence.rounding_reckoned();
   options.least_gain =
       std::max(options.least_gain, kFormAllowance * evidence.count(Role::held_out));
   options.form = kForm * evidence.count(Role::held_out);

@@ -23,6 +23,10 @@ double wrong_by(double believed, const Explained& explained, const std::vector<d
 Doubt doubt_of(const DiagnosisOptions& options) {
   Doubt doubt = options.form_of_channel;
   for (double& d : doubt) d *= options.taken_of_form;
+  const std::vector<double>& rounding = options.rounding_of_channel;
+  doubt.resize(std::max(doubt.size(), rounding.size()), 0.0);
+  for (std::size_t c = 0; c < rounding.size(); ++c)
+    doubt[c] += options.taken_of_rounding * rounding[c];
   return doubt;
 }
 

@@ -5,6 +5,8 @@
 // channel only that counts which exceeds such a part. An effect that leaves next to nothing in the
 // channel where it explains most has been seen to be right, and is doubted less everywhere. What
 // was brought into a channel where nothing was is no gain of the next one that takes it out again.
+// What encoders round off is known as a sample only, and repeats (friction that is stirred by it is
+// another friction): a twentieth of its chi-square counts for nobody, either.
 #pragma once
 
 #include <vector>

@@ -21,6 +21,10 @@ struct DiagnosisOptions {
   /// one effect may take for its own. Empty: none.
   std::vector<double> form_of_channel;
   double taken_of_form = 0.5;
+  /// Chi-square per channel that encoders make as reckoned, and the share of it that counts for
+  /// nobody: what they make is known as a sample, and it repeats. Empty: none.
+  std::vector<double> rounding_of_channel;
+  double taken_of_rounding = 0.05;
   /// RMS of the reading that this form makes; less in readings alone is a note.
   double form_um = 0;
   /// Below both, an effect is of no consequence: RMS of what it does to the contour, and to any

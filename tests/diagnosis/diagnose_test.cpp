@@ -84,6 +84,20 @@ TEST(Diagnose, WhatIsStillLoudIsNotExplained) {
   EXPECT_EQ(verdict_sentence(none), "something is there that no suspect explains");
 }
 
+/// Nobody knows what of it would repeat.
+TEST(Diagnose, WhatWasRunOnceIsNotCalledLoud) {
+  Record record = measured({}, 5);
+  Stretch& once = record.stretches.back();
+  once.condition = 99;
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::deflection)
+      for (std::size_t k = once.begin; k < once.end; ++k)
+        s.value[k] += 1e-6 * std::sin(2 * kPi * static_cast<double>(k) / 700);
+  const Diagnosis d = diagnosed(record);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::no_deviation);
+  EXPECT_TRUE(d.notes.empty()) << d.notes.front();
+}
+
 TEST(Diagnose, NamesALawWhereTheLibraryHasNone) {
   // A displacement by a function of the other axis, which no candidate makes.
   Record record = measured({}, 3);

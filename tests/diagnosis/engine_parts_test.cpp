@@ -260,6 +260,9 @@ TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {
   DiagnosisOptions options;
   options.share_of_found = 0.01;
   EXPECT_TRUE(doubt_of(options).empty());
+  options.rounding_of_channel = {0, 400};
+  EXPECT_EQ(doubt_of(options), (Doubt{0, 20}));
+  options.rounding_of_channel.clear();
   // What was brought into the second channel counts for nobody who takes it out.
   EXPECT_EQ(doubt_of(options, {{2000, -100}}, {2500, 500}, {500, 600}), (Doubt{20, 100}));
   options.form_of_channel = {100, 0};
