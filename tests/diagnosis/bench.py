@@ -43,6 +43,7 @@ NOT_REPEATABLE = {"encoder_quantisation", "bus_loss", "bus_jitter", "frame_vibra
                   "sample_jitter", "dropped_samples"}
 BEFORE_THE_COMMAND = {"corner_cutting", "chord_error", "path_filter"}
 STOPS_AT_ONCE = {"contact_loss"}  # the NC unit's own check of the readings stops the machine: an alarm, no record of it
+TOLERATED = {"windup", "backlash", "coulomb", "stribeck", "viscous", "presliding"}  # declared ones have a tolerance
 FOUND_BEFOREHAND = {"period_slip"}  # before anything is fitted: nothing to suspect
 SET_UP = {"piece_offset", "piece_tilt"}  # clamped anew for every run: never a finding
 S_PIECE = HERE.parents[1] / "configs/pieces/s_eq1.toml"
@@ -137,12 +138,15 @@ def draw_own(rng, entry, declared):
     """An effect of the library at one of its places, sizes within a factor of three about the typical one."""
     place = entry["places"][rng.integers(len(entry["places"]))]
     factor, sign = 3 ** rng.uniform(-1, 1), rng.choice([-1.0, 1.0])
-    parameters, assignments = {}, []
+    parameters, assignments, size = {}, [], None
     for p in place["parameters"]:
         short, nominal, default = p["key"].rsplit(".", 1)[1], p["nominal"], p["default"]
         held = declared_number(declared, p["key"])
         if held is not None:
             value = (np.asarray(held) * (1 + sign * min(0.4 * factor / 3, 0.6))).tolist() if not parameters else held
+            if not parameters:  # of a declared number its change counts, against its tolerance where it has one
+                change = float(np.abs(np.subtract(value, held)).flat[0])
+                size = (p["key"] if entry["name"] in TOLERATED else f"{place['place']}.{entry['name']}", change)
         elif short.startswith("phase"):
             value = float(rng.uniform(-180, 180))
         elif short == "start_s":
@@ -158,7 +162,8 @@ def draw_own(rng, entry, declared):
             value = np.clip(value, p["min"], p["max"]).tolist()
         parameters[short] = value
         assignments.append((p["key"], value))
-    return {"name": entry["name"], "place": place["place"], "parameters": parameters}, assignments
+    effect = {"name": entry["name"], "place": place["place"], "parameters": parameters}
+    return effect, assignments, size or (f"{place['place']}.{entry['name']}", grading.first_number(effect))
 
 
 def set_up(rng, declared):
@@ -196,11 +201,12 @@ def own_scenarios(rng, counts, entries, declared):
                 name = order.pop() if number == 1 else str(rng.choice(names))
                 if name not in chosen and not (kind == "without" and name in generate.NEVER_LEFT_OUT):
                     chosen.append(name)
-            s = {"kind": kind, "effects": [], "values": {}, "number": len(out)}
+            s = {"kind": kind, "effects": [], "values": {}, "sizes": [], "number": len(out)}
             assignments = dict(set_up(rng, declared))
             for name in chosen:
-                effect, values = draw_own(rng, entries[name], declared)
+                effect, values, size = draw_own(rng, entries[name], declared)
                 s["effects"].append(effect)
+                s["sizes"].append(size)
                 assignments.update(values)
                 s["values"].update(generate.by_component(values))
             if kind == "without":
