@@ -469,14 +469,16 @@ class Report {
   }
 
   /// Tells signals that are still off by more than noise, and by more of what they were off than a
-  /// model of something that was found may be wrong by. Of an axis that vibrates by itself, and of
-  /// what that makes of the readings, tell_chatter() tells.
+  /// model of something that was found may be wrong by, on fitted and on held-out laps: what one
+  /// lap does alone is no deviation. Of an axis that vibrates by itself, and of what that makes of
+  /// the readings, tell_chatter() tells.
   void tell_what_is_still_off() {
     if (!evidence_.noise().from_repetitions || !before_.chatter.empty()) return;
+    const Prediction found = evidence_.predict(d_.found);
     const std::vector<double> before = evidence_.rms_within_laps(evidence_.predict(of_.declared),
                                                                  Role::held_out),
-                              after = evidence_.rms_within_laps(evidence_.predict(d_.found),
-                                                                Role::held_out);
+                              after = evidence_.rms_within_laps(found, Role::held_out),
+                              fitted = evidence_.rms_within_laps(found, Role::fitted);
     for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c) {
       const double n = evidence_.count(c, Role::held_out);
       if (n < kFewSamples) continue;
@@ -486,7 +488,8 @@ class Report {
       const auto beyond = [&](double rms) {
         return std::sqrt(std::max(0.0, rms * rms - noise * noise));
       };
-      if (is < kLoud * noise || beyond(is) < kWrongOfFound * beyond(was)) continue;
+      if (std::min(is, fitted[c]) < kLoud * noise || beyond(is) < kWrongOfFound * beyond(was))
+        continue;
       still_off_ = true;
       const ComparedChannel& channel = evidence_.replica().channels()[c];
       const ShownUnit unit = shown_unit(channel);

@@ -84,6 +84,46 @@ TEST(Diagnose, WhatIsStillLoudIsNotExplained) {
   EXPECT_EQ(verdict_sentence(none), "something is there that no suspect explains");
 }
 
+/// Where its encoder may decide what the axis does, in the fitted laps of the first condition.
+class UndecidedReplica : public toy::ToyReplica {
+ public:
+  explicit UndecidedReplica(const Record& record) : ToyReplica(record), record_(record) {}
+  std::vector<std::vector<double>> rounding(const Machine& m) const override {
+    std::vector<std::vector<double>> all(3, std::vector<double>(predict(m)[0].size(), 1e-12));
+    for (const Stretch& s : record_.stretches)
+      if (s.condition == 0 && s.repetition % 2 == 0)
+        for (std::size_t k = s.begin + 100; k < s.begin + 200; ++k) all[2][k] = 20e-6;
+    return all;
+  }
+
+ private:
+  const Record& record_;
+};
+
+/// It is no deviation where what was fitted does not show it.
+TEST(Diagnose, WhatHeldOutLapsAloneDoIsNotCalledLoud) {
+  Record record = measured({}, 5);
+  for (MeasuredSignal& s : record.signals)
+    for (const Stretch& lap : record.stretches)
+      for (std::size_t k = lap.begin + 100; k < lap.begin + 200; ++k)
+        if (s.kind == SignalKind::deflection && lap.condition == 0) s.value[k] += 2e-6;
+  const Machine declared;
+  DiagnosisOptions options;
+  options.suspects = {"X.coulomb"};
+  toy::ToyReplica known(record);
+  EXPECT_NE(diagnose({record, known, declared, suspected(toy::candidates(), {}, options.suspects)},
+                     options)
+                .notes.front()
+                .find("is still off"),
+            std::string::npos);
+  UndecidedReplica undecided(record);
+  for (const std::string& note :
+       diagnose({record, undecided, declared, suspected(toy::candidates(), {}, options.suspects)},
+                options)
+           .notes)
+    EXPECT_EQ(note.find("is still off"), std::string::npos) << note;
+}
+
 /// Nobody knows what of it would repeat.
 TEST(Diagnose, WhatWasRunOnceIsNotCalledLoud) {
   Record record = measured({}, 5);
