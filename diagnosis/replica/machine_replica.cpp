@@ -260,7 +260,7 @@ bool MachineReplica::anchor(const Machine& machine) {
   anchor->off_record = off_record(full.reading);
   anchor->ball_offset = sum(full.ball, quick, -1);
   anchor->reading_offset = sum(full.reading, replay_sensing(h.actual, full.ball, axes), -1);
-  anchor->reading = signals_err(h.actual) && !anchor->needs_full(h)
+  anchor->reading = signals_err(h.actual) && !anchor->lifts
                         ? sum(replay_sensing(h.actual, full.ball, axes, &anchor->off_record),
                               anchor->reading_offset, 1)
                         : full.reading;

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <map>
 #include <numeric>
 #include <unsupported/Eigen/FFT>
 
@@ -70,14 +68,14 @@ std::vector<LapNoise> lap_noise(const Partition& partition, const Series& residu
   return all;
 }
 
-/// The stretches as they are, or those that `which` takes, less their straight lines; every other
-/// one is held out.
-std::vector<LapNoise> whole_laps(
-    const Partition& partition, const Series& value,
-    const std::function<bool(const Stretch&)>& which = [](const Stretch&) { return true; }) {
+enum class Which { all, run_once };
+
+/// The stretches as they are less their straight lines; every other one is held out.
+std::vector<LapNoise> whole_laps(const Partition& partition, const Series& value,
+                                 Which which = Which::all) {
   std::vector<LapNoise> all;
   for (const Stretch& s : partition.stretches) {
-    if (!which(s)) continue;
+    if (which == Which::run_once && !partition.once(s)) continue;
     LapNoise lap{Series(value.begin() + static_cast<std::ptrdiff_t>(s.begin),
                         value.begin() + static_cast<std::ptrdiff_t>(s.end)),
                  all.size() % 2 == 0};
@@ -191,10 +189,7 @@ std::vector<NoiseLine> find_lines(const ComparedChannel& channel, const std::vec
 /// no noisier than those.
 WhiteningFilter filter_of_once(const Partition& partition, const Series& residual,
                                const Series& added, const WhiteningFilter& laps, double of_laps) {
-  std::map<int, int> times;
-  for (const Stretch& s : partition.stretches) ++times[s.condition];
-  const std::vector<LapNoise> once =
-      whole_laps(partition, residual, [&](const Stretch& s) { return times[s.condition] == 1; });
+  const std::vector<LapNoise> once = whole_laps(partition, residual, Which::run_once);
   Series covariance = covariances(once);
   for (std::size_t j = 0; j < added.size(); ++j) covariance[j] += added[j];
   if (!(covariance[0] > of_laps)) return laps;
@@ -280,9 +275,7 @@ NoiseAudit audit_noise(const Record& record, const Partition& partition,
     // Where the laps are quieter than the channel can be, what it can be counts.
     noise.filter.scale = std::sqrt(quiet || covariance[0] > of_laps ? expected : left);
     noise.of_laps = std::min(1.0, left / (noise.filter.scale * noise.filter.scale));
-    noise.once = partition.repeated ? filter_of_once(partition, residual[c], of_rounding,
-                                                     noise.filter, covariance[0])
-                                    : noise.filter;
+    noise.once = filter_of_once(partition, residual[c], of_rounding, noise.filter, covariance[0]);
     if (audit.from_repetitions) {
       const std::vector<NoiseLine> lines =
           find_lines(channels[c], laps, record.period, 0.1 * std::sqrt(least));

@@ -44,6 +44,12 @@ std::size_t Partition::conditions() const {
   return all.size();
 }
 
+bool Partition::once(const Stretch& stretch) const {
+  return repeated && std::count_if(stretches.begin(), stretches.end(), [&](const Stretch& s) {
+                       return s.condition == stretch.condition;
+                     }) == 1;
+}
+
 Partition partition(const Record& record) {
   Partition p;
   p.stretches = record.stretches;
@@ -61,7 +67,7 @@ Partition partition(const Record& record) {
     const Stretch& s = p.stretches[i];
     const std::size_t length = s.end - s.begin;
     const std::size_t pieces = std::max<std::size_t>(1, (length + second / 2) / second);
-    const bool once = p.repeated && repetitions[s.condition] == 1;
+    const bool once = p.once(s);
     const int lap = seen[s.condition]++;
     const int of =
         first.try_emplace(s.condition, 1 - static_cast<int>(first.size()) % 2).first->second;

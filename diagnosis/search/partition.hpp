@@ -28,6 +28,8 @@ struct Partition {
   bool repeated = false;           ///< some condition was run more than once
 
   std::size_t conditions() const;
+  /// Whether a stretch was run once, though others were repeated.
+  bool once(const Stretch& stretch) const;
   /// The laps of every condition that was run more than once, all as long as its shortest.
   std::vector<std::vector<Stretch>> repetitions() const;
 };
