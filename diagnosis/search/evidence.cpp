@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 #include "diagnosis/search/comparable.hpp"
-#include "diagnosis/search/freed_number.hpp"
 #include "diagnosis/search/parallel.hpp"
 #include "model/axes.hpp"
 
@@ -15,10 +14,9 @@ namespace {
 constexpr double kShift = 10e-6;  // of a piece, to see what one does [m]
 /// Times what encoders were reckoned to make of a reading that they may make of it.
 constexpr double kUnderrated = 2;
-/// Times what encoders usually make of a signal, or laps differ by, from which on they or next to
-/// nothing decide what an axis does; and how long before and after.
+/// Times what encoders usually make of a signal, or laps differ by, from which on they decide what
+/// an axis does; and how long before and after.
 constexpr double kUndecided = 6, kUndecidedReach = 0.02;  // [s]
-constexpr double kShaken = 2e-4;                          // part of the masses: next to nothing
 
 /// sum of a b, in doubles and several at a time.
 double dot(const float* a, const float* b, std::size_t n) {
@@ -53,16 +51,6 @@ double usual_size(const std::vector<double>& series) {
   const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
   return 1.4826 * *middle;
-}
-
-/// Whose bodies are heavier by a part of what they are.
-Machine with_masses_changed(Machine machine, double part) {
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    const std::string key =
-        "axes." + std::string(kAxisNames[axis]) + (is_rotary(axis) ? ".load_kgm2" : ".load_kg");
-    move_number(machine, key, number_of(machine, key) * (1 + part));
-  }
-  return machine;
 }
 
 /// Whose readings say where the ball is.
@@ -131,7 +119,7 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
 
 void Evidence::reckon_with_rounding(const Machine& machine) {
   SeriesOfChannels rounding = rounding_of(machine);
-  leave_out_undecided(machine, rounding);
+  leave_out_undecided(rounding);
   mask(rounding);
   mask(difference_);
   noise_ = audit_noise(record_, partition_, replica_.channels(), difference_, rounding);
@@ -184,28 +172,18 @@ void Evidence::leave_out(const std::vector<LapEvent>& events) {
     }
 }
 
-void Evidence::leave_out_undecided(const Machine& machine, const SeriesOfChannels& rounding) {
-  if (rounding.empty()) return;
-  std::vector<SeriesOfChannels> changes{rounding};
-  const Prediction as_is = predict(machine);
-  for (const Prediction& shaken : predict_all(
-           {with_masses_changed(machine, -kShaken), with_masses_changed(machine, kShaken)})) {
-    SeriesOfChannels& change = changes.emplace_back(shaken.begin(), shaken.end());
-    for (std::size_t c = 0; c < change.size(); ++c)
-      for (std::size_t k = 0; k < change[c].size(); ++k) change[c][k] -= as_is[c][k];
-  }
+void Evidence::leave_out_undecided(const SeriesOfChannels& rounding) {
   const auto reach = static_cast<std::size_t>(kUndecidedReach / record_.period);
   for (std::size_t c = 0; c < rounding.size(); ++c) {
+    const std::vector<double>& x = rounding[c];
     const double usual =
-        std::max(usual_size(rounding[c]), lap_scatter(partition_, difference_[c]).value_or(0));
-    for (const SeriesOfChannels& change : changes)
-      for (std::size_t k = 0; k < change[c].size(); ++k) {
-        if (!(std::abs(change[c][k]) > kUndecided * usual)) continue;
-        const std::size_t begin = k > reach ? k - reach : 0,
-                          end = std::min(change[c].size(), k + reach + 1);
-        std::fill(raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(begin),
-                  raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(end), 0);
-      }
+        std::max(usual_size(x), lap_scatter(partition_, difference_[c]).value_or(0));
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      if (!(std::abs(x[k]) > kUndecided * usual)) continue;
+      const std::size_t begin = k > reach ? k - reach : 0, end = std::min(x.size(), k + reach + 1);
+      std::fill(raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(begin),
+                raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(end), 0);
+    }
   }
 }
 

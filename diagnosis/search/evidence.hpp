@@ -10,8 +10,7 @@
 //
 // Only samples that can be compared count (comparable.hpp), none outside every stretch, not what an
 // axis does in one lap and not in another (lap_events.hpp), and not moments at which the rounding
-// of an encoder, or next to nothing, decides what an axis does (whether friction holds it here or a
-// little further).
+// of an encoder decides what an axis does (whether friction holds it here or a little further).
 #pragma once
 
 #include <Eigen/Dense>
@@ -156,7 +155,7 @@ class Evidence {
   std::vector<SeriesOfChannels> readings_per_shift(const std::vector<Machine>& shifted) const;
   SeriesOfChannels rounding_of(const Machine& machine) const;
   void leave_out(const std::vector<LapEvent>& events);
-  void leave_out_undecided(const Machine& machine, const SeriesOfChannels& rounding);
+  void leave_out_undecided(const SeriesOfChannels& rounding);
   void count_valid();
   void whiten_shifts(const Eigen::Vector3d& shift);
   /// Says nothing of samples that cannot be compared.
