@@ -1,9 +1,11 @@
 #include "diagnosis/replica/probe_replay.hpp"
 
 #include <cmath>
+#include <optional>
 
 #include "diagnosis/replica/effect_stage.hpp"
 #include "diagnosis/replica/fingerprint.hpp"
+#include "model/probe/heydemann.hpp"
 #include "model/probe/probe_sensor.hpp"
 
 namespace vcnc {
@@ -136,11 +138,49 @@ bool corrects_signals(const Machine& actual) {
   return actual.probe.correction == ProbeParams::Correction::heydemann;
 }
 
-/// Those that nobody corrects.
-Chain<AnaloguePort> signal_errors(const Machine& actual) {
-  if (corrects_signals(actual)) return {};
-  return machine_chain<AnaloguePort>(actual.effects, kSeed);
-}
+/// The sin/cos signals of one channel, once per cycle.
+class CoarseSignals {
+ public:
+  CoarseSignals(const Machine& actual, int channel)
+      : errors_(machine_chain<AnaloguePort>(actual.effects, kSeed)),
+        channel_(channel),
+        period_(actual.probe.signal_period),
+        corrects_(corrects_signals(actual)) {}
+
+  bool ideal() const { return errors_.empty(); }
+
+  /// What the channel reads too much where the ball is at x [m].
+  double error(double x, std::size_t cycle) {
+    const double phase = 2 * kPi / period_ * x;
+    const SinCos signal = corrects_ ? corrected(phase, cycle) : raw(phase, cycle);
+    const double shift = std::atan2(signal.w, signal.u) - phase;
+    return (shift - 2 * kPi * std::round(shift / (2 * kPi))) * period_ / (2 * kPi);
+  }
+
+ private:
+  SinCos raw(double phase, std::size_t cycle) {
+    const SinCos ideal = Lissajous{.amplitude = kSignalAmplitude}.signals(phase);
+    AnaloguePort::Signal<double> signal{ideal.u, ideal.w};
+    errors_.step(signal, {moment_of(cycle), channel_, kSignalAmplitude});
+    return {signal.cosine, signal.sine};
+  }
+
+  SinCos corrected(double phase, std::size_t cycle) {
+    if (!corrector_.ellipse() && cycle > 0)
+      for (std::size_t i = 1; i < kTruthPerCycle; ++i)
+        corrector_.correct(
+            raw(std::lerp(phase_, phase, static_cast<double>(i) / kTruthPerCycle), cycle));
+    phase_ = phase;
+    return corrector_.correct(raw(phase, cycle));
+  }
+
+  Chain<AnaloguePort> errors_;
+  int channel_;
+  double period_;
+  bool corrects_;
+  OnlineCorrector corrector_;
+  double phase_ = 0;  ///< of the last cycle, while there is no ellipse
+};
 
 /// Adds the effects of one stage.
 void add_effects(Fingerprint& print, const Machine& actual, EffectStage stage) {
@@ -248,10 +288,9 @@ Deflections replay_contact(const Machine& actual, const Piece* piece, NearbyPose
 Deflections replay_sensing(const Machine& actual, const Deflections& ball, const AxisReplays& axes,
                            const Deflections* moved) {
   Chain<DeflectionPort> feeling = machine_chain<DeflectionPort>(actual.effects, kSeed);
-  Chain<AnaloguePort> signals = signal_errors(actual);
+  std::array signals{CoarseSignals(actual, 0), CoarseSignals(actual, 1), CoarseSignals(actual, 2)};
   Chain<ReadingPort> counting = machine_chain<ReadingPort>(actual.effects, kSeed);
-  if (feeling.empty() && signals.empty() && counting.empty()) return ball;
-  const double period = actual.probe.signal_period;
+  if (feeling.empty() && signals[0].ideal() && counting.empty()) return ball;
   Deflections reading = ball;
   for (std::size_t k = 0; k < ball[0].size(); ++k) {
     Vec3 x(ball[0][k], ball[1][k], ball[2][k]);
@@ -260,20 +299,15 @@ Deflections replay_sensing(const Machine& actual, const Deflections& ball, const
       feeling.step(signal, {moment_of(k), actual.probe.spring_rate});
       x = signal.deflection;
     }
-    for (int c = 0; c < 3 && !signals.empty(); ++c) {
-      const double by = moved ? (*moved)[static_cast<std::size_t>(c)][k] : 0;
-      const double phase = 2 * kPi / period * (x[c] + by);
-      AnaloguePort::Signal<double> signal{kSignalAmplitude * std::cos(phase),
-                                          kSignalAmplitude * std::sin(phase)};
-      signals.step(signal, {moment_of(k), c, kSignalAmplitude});
-      const double shift = std::atan2(signal.sine, signal.cosine) - phase;
-      x[c] += (shift - 2 * kPi * std::round(shift / (2 * kPi))) * period / (2 * kPi);
+    for (std::size_t c = 0; c < 3 && !signals[0].ideal(); ++c) {
+      double& felt = x[static_cast<Eigen::Index>(c)];
+      felt += signals[c].error(felt + (moved ? (*moved)[c][k] : 0), k);
     }
     if (!counting.empty()) {
       Motions<double> motions;
       read_motions(axes, k, motions);
       ReadingPort::Signal<double> signal{x};
-      counting.step(signal, {moment_of(k), period, &motions});
+      counting.step(signal, {moment_of(k), actual.probe.signal_period, &motions});
       x = signal.deflection;
     }
     for (std::size_t c = 0; c < 3; ++c) reading[c][k] = x[static_cast<Eigen::Index>(c)];
@@ -281,18 +315,16 @@ Deflections replay_sensing(const Machine& actual, const Deflections& ball, const
   return reading;
 }
 
-bool signals_err(const Machine& actual) { return !signal_errors(actual).empty(); }
+bool signals_err(const Machine& actual) {
+  return !corrects_signals(actual) && !machine_chain<AnaloguePort>(actual.effects, kSeed).empty();
+}
 
 bool lifts(const Machine& actual) { return !actual.effects.get<ContactLoss>().null(); }
 
 std::string fingerprint_of_full_probe(const Machine& actual) {
   Fingerprint print;
-  for_each_effect_of(actual.effects, [&]<class Effect>(const Effect& effect, std::size_t axis) {
-    if (effect.null()) return;
-    if (std::is_same_v<Effect, ReturnToZero> ||
-        (std::is_same_v<typename Effect::Port, AnaloguePort> && corrects_signals(actual)))
-      add_effect(print, effect, axis);
-  });
+  if (const auto& guides = actual.effects.get<ReturnToZero>(); !guides.null())
+    add_effect(print, guides, kAxisCount);
   return print.bytes();
 }
 

@@ -13,11 +13,12 @@
 // takes, N = m dv_n / h, limits Coulomb friction, whose impulse and that of the guides act evenly
 // over the step. Sensing: effects on the deflection and the counters once per cycle; those on the
 // sin/cos signals by the phase they shift, x += (atan2(w', u') - phi) period / 2 pi, without
-// converter and without counting: nothing slips.
+// converter and without counting: nothing slips. Where signals are corrected online, the
+// correction sees its samples of 100 us on straight lines between cycles, until it has its ellipse.
 //
 // Neglected against the full probe: motion of the tool within 1 ms other than even, quantisation by
-// the converter (0.13 nm), and what needs_full_probe() names. What is left cancels in the
-// difference to first order.
+// the converter (0.13 nm), and what only fingerprint_of_full_probe() names. What is left cancels in
+// the difference to first order.
 #pragma once
 
 #include <array>
@@ -98,12 +99,12 @@ Deflections replay_sensing(const Machine& actual, const Deflections& ball, const
 bool lifts(const Machine& actual);
 
 /// What only the full probe tells: the hysteresis of the guides, whose friction depends on the
-/// sliding within a cycle, and effects on signals that are corrected online. The quick one leaves
-/// it out, so it tells differences between machines that agree in this.
+/// sliding within a cycle. The quick one leaves it out, so it tells differences between machines
+/// that agree in this.
 std::string fingerprint_of_full_probe(const Machine& actual);
 
-/// Whether some effect makes errors of the sin/cos signals that stay in the reading and repeat with
-/// their period.
+/// Whether some effect makes errors of the sin/cos signals that stay in the reading, uncorrected,
+/// and repeat with their period.
 bool signals_err(const Machine& actual);
 
 /// Whether errors of the geometry follow the axes' accelerations, or remember: then those near
