@@ -456,8 +456,19 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
   best.gain = counted_of(*acting);
   best.law.words = "behaves like " + words_of(law);
   best.law.share = std::min(1.0, best.gain / excess);
-  best.machine = acting->settled.machine;
-  best.machine.effects.laws.back() = law;
+  // What that leaves is told in the loop: numbers moved along their columns may disappoint there.
+  FittedMachine learned = at;
+  learned.machine = acting->machine;
+  converge(evidence, learned);
+  best.machine = evidence.chi2(learned.residual, Role::fitted) < acting->settled.fitted
+                     ? learned.machine
+                     : acting->settled.machine;
+  if (evidence.chi2(evidence.residual(evidence.predict(best.machine)), Role::held_out) >=
+      evidence.chi2(at.residual, Role::held_out)) {
+    best.gain = 0;
+    best.machine = at.machine;
+    return best;
+  }
   const double band = options.class_gain + options.class_share * excess;
   for (const std::size_t i : order)
     if (fits[i].gain > fits[order.front()].gain - band &&
