@@ -463,6 +463,7 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
   best.machine = evidence.chi2(learned.residual, Role::fitted) < acting->settled.fitted
                      ? learned.machine
                      : acting->settled.machine;
+  best.machine.effects.laws.back() = law;  // with its label
   if (evidence.chi2(evidence.residual(evidence.predict(best.machine)), Role::held_out) >=
       evidence.chi2(at.residual, Role::held_out)) {
     best.gain = 0;

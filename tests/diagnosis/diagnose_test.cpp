@@ -148,6 +148,8 @@ TEST(Diagnose, NamesALawWhereTheLibraryHasNone) {
   const Diagnosis d = diagnosed(record);
   ASSERT_TRUE(d.law);
   EXPECT_EQ(d.verdict, DiagnosisVerdict::unexplained);
+  ASSERT_EQ(d.found.effects.laws.size(), 1);  // the model file says where it comes from
+  EXPECT_TRUE(d.found.effects.laws[0].label.starts_with("learned: "));
 }
 
 TEST(Diagnose, SeveralNamesForWhatOneLawDoesAreTakenAway) {
