@@ -32,9 +32,6 @@ constexpr double kChangeOfForm = 0.05;
 
 /// Effects that are told between two runs of one machine: more are a law that nobody has named.
 constexpr std::size_t kMostChanges = 5, kFewChanges = 3;
-/// Times that all is sought once more, with what was found being no noise any more, where no laps
-/// tell the noise.
-constexpr int kMostRounds = 4;
 /// Part of what is left that each of them must explain: less is what those before got wrong.
 constexpr double kShareOfChange = 0.1;
 /// The same at a drive where one was found.
@@ -122,16 +119,14 @@ struct Question {
 
 /// A search with everything that it was made with.
 struct Attempt {
-  /// `encoders`: a machine whose encoders make the noise, and what it leaves, where no laps tell
-  /// that; null: the declared one.
+  /// `encoders`: a machine whose encoders make the noise; null: the declared one.
   Attempt(const Question& question, FoundBeforehand known, const DiagnosisOptions& asked,
           const KeepGoing& keep_going, const Machine* encoders)
       : evidence(question.of.record, question.of.replica, question.declared,
                  question.difference ? question.difference->noise_scale : 1, question.left),
         before(std::move(known)) {
     const auto& [of, difference, declared, left] = question;
-    if (encoders && evidence.noise().from_repetitions) evidence.reckon_with_rounding(*encoders);
-    if (encoders && !evidence.noise().from_repetitions) evidence.take_noise_from(*encoders);
+    if (encoders) evidence.reckon_with_rounding(*encoders);
     before.chatter = find_chatter(evidence, declared, of.candidates,
                                   difference ? difference->noise : HealthyNoise{});
     for (const Chatter& c : before.chatter)
@@ -161,21 +156,13 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
   if (before.slip) declared.effects.get<PeriodSlip>() = *before.slip;
   if (!difference) question.left = left_by_commissioning(declared, of.replica.channels());
   auto search = std::make_unique<Attempt>(question, before, asked, keep_going, nullptr);
-  const auto once_more = [&] {
-    const Machine found = search->selection.found.machine;
+  const Machine found = search->selection.found.machine;
+  bool anew = !search->selection.interrupted && search->evidence.underrates_rounding(found);
+  if (anew) {
     of.replica.anchor(declared);
-    auto next = std::make_unique<Attempt>(question, before, asked, keep_going, &found);
-    if (next->selection.interrupted) return false;
-    std::swap(search, next);
-    return true;
-  };
-  bool anew = false;
-  if (search->evidence.noise().from_repetitions) {
-    anew = !search->selection.interrupted &&
-           search->evidence.underrates_rounding(search->selection.found.machine) && once_more();
-  } else {
-    for (int round = 0; round < kMostRounds && !search->selection.interrupted; ++round)
-      if (!search->evidence.is_quieter_with(search->selection.found.machine) || !once_more()) break;
+    auto second = std::make_unique<Attempt>(question, before, asked, keep_going, &found);
+    anew = !second->selection.interrupted;
+    if (anew) search = std::move(second);
   }
   Diagnosis d = findings_of(of, search->evidence, search->options, std::move(search->selection),
                             std::move(search->before), difference != nullptr);

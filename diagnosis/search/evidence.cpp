@@ -14,8 +14,6 @@ namespace {
 constexpr double kShift = 10e-6;  // of a piece, to see what one does [m]
 /// Times what encoders were reckoned to make of a reading that they may make of it.
 constexpr double kUnderrated = 2;
-/// Part of the noise that there is at most where there is clearly less.
-constexpr double kQuieter = 0.8;
 /// Times what encoders usually make of a signal, or laps differ by, from which on they decide what
 /// an axis does; and how long before and after.
 constexpr double kUndecided = 6, kUndecidedReach = 0.02;  // [s]
@@ -138,28 +136,6 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
   if (!per_shift_.empty()) whiten_shifts(rms_shift(partition_.stretches, per_shift_, rounding));
   rms_of_rounding_ = rms_of_all(rounding);
   chi2_of_rounding_ = chi2_of(whiten(rounding), Role::held_out);
-}
-
-void Evidence::take_noise_from(const Machine& machine) {
-  difference_ = left_by(machine);
-  reckon_with_rounding(machine);
-}
-
-bool Evidence::is_quieter_with(const Machine& machine) const {
-  const NoiseAudit now =
-      audit_noise(record_, partition_, replica_.channels(), left_by(machine), rounding_of(machine));
-  for (std::size_t c = 0; c < now.channels.size(); ++c)
-    if (now.channels[c].rms < kQuieter * noise_.channels[c].rms) return true;
-  return false;
-}
-
-SeriesOfChannels Evidence::left_by(const Machine& machine) const {
-  const Prediction prediction = predict(machine);
-  SeriesOfChannels left = measured_;
-  for (std::size_t c = 0; c < left.size(); ++c)
-    for (std::size_t k = 0; k < left[c].size(); ++k) left[c][k] -= prediction[c][k];
-  mask(left);
-  return left;
 }
 
 bool Evidence::underrates_rounding(const Machine& machine) const {
@@ -430,8 +406,7 @@ std::vector<double> Evidence::rms_within_laps(const Prediction& prediction, Role
   for (std::size_t c = 0; c < off.size(); ++c)
     for (std::size_t k = 0; k < off[c].size(); ++k) off[c][k] -= prediction[c][k];
   mask(off);
-  if (!per_shift_.empty() && partition_.repeated)
-    take_out_shifts(partition_.stretches, per_shift_, off, Shifts::constant);
+  if (!per_shift_.empty()) take_out_shifts(partition_.stretches, per_shift_, off, Shifts::constant);
   for (const Block& block : partition_.blocks)
     for (std::size_t c = 0; block.once && c < off.size(); ++c)
       std::fill(off[c].begin() + static_cast<std::ptrdiff_t>(block.begin),

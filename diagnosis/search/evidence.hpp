@@ -105,10 +105,6 @@ class Evidence {
   /// From now on noise is what encoders make of it in this machine; all drives count again. Not
   /// with columns made before.
   void reckon_with_rounding(const Machine& machine);
-  /// From now on noise is what this machine leaves, where laps do not tell it. As above.
-  void take_noise_from(const Machine& machine);
-  /// Whether some signal is clearly quieter then.
-  bool is_quieter_with(const Machine& machine) const;
   /// W (y - yhat).
   Column residual(const Prediction& prediction) const;
   /// W (changed - base) / step.
@@ -158,8 +154,6 @@ class Evidence {
   /// where there are none.
   std::vector<SeriesOfChannels> readings_per_shift(const std::vector<Machine>& shifted) const;
   SeriesOfChannels rounding_of(const Machine& machine) const;
-  /// y - yhat where it can be compared.
-  SeriesOfChannels left_by(const Machine& machine) const;
   void leave_out(const std::vector<LapEvent>& events);
   void leave_out_undecided(const SeriesOfChannels& rounding);
   void count_valid();

@@ -15,14 +15,10 @@
 // can predict it: a sample of it is added, which counts double what laps do show of it.
 //
 // A channel can never be quieter than its own step (q^2/12, Widrow 1956), nor than the replica is
-// exact. Without repetitions the filter is fitted to the residual itself, so that what it can
-// predict from its own past has little weight and effects are underrated; s is 1.4826 times the
-// median size of what it leaves (the standard deviation if that is normal), which the few moments
-// do not change at which an axis turns over. Noise is what such a filter cannot foretell:
-// sigma = s / sqrt(1 + sum a_j^2). Once something was found all is done anew with what that leaves
-// (diagnose.cpp). The filter is fitted to the residual itself of what was run once, too, though
-// other motions were repeated (the way to a circle and back), where that differs from the model by
-// more than the laps do from each other.
+// exact. Without repetitions the filter is fitted to the residual itself: all it can predict from
+// its own past counts as noise, so that effects are underrated, not overrated. The same is done of
+// what was run once though other motions were repeated (the way to a circle and back), where that
+// differs from the model by more than the laps do from each other.
 #pragma once
 
 #include <optional>
