@@ -59,6 +59,7 @@ std::string modes(const ProgramOptions& o, int plane) {
                      plane, o.tolerance_um * 1e-3);
 }
 
+std::string lift() { return "G91\nG28 Z0\nG90\n"; }
 std::string go_home() { return "G49\nG91\nG28 Z0\nG28 X0 Y0\nG28 A0 C0\nG90\nM30\n"; }
 
 /// A decimal without "-0.00000".
@@ -159,7 +160,7 @@ std::string scan_program(const std::string& what, const Machine& machine, const 
     for (Station& station : closed) station.s = total - station.s;
   }
   const double lap = closed.back().s, run_in = o.run_in_mm * 1e-3, first = lap / 8;
-  const std::vector<Station> stations = unroll(closed, first - run_in, o.laps * lap + 2 * run_in);
+  const std::vector<Station> stations = unroll(closed, first - run_in, lap + 2 * run_in);
   const std::vector<Pose> path = thin(poses(stations, machine), o.chord_tolerance_um * 1e-6);
   const Pose &begin = path.front(), &end = path.back();
   const Vec3 up(0, 0, o.clearance_mm * 1e-3);
@@ -169,27 +170,32 @@ std::string scan_program(const std::string& what, const Machine& machine, const 
   text += fmt::format(
       "(Ball radius {:g} mm, pre-deflection {:g} mm, height {:g} mm above the workpiece zero.)\n"
       "({} lap of {:.3f} mm from {:.3f} mm behind the first station; {:g} mm run-in before and\n",
-      ball * 1e3, interference * 1e3, z * 1e3, o.laps == 1 ? "One" : std::to_string(o.laps) + " x",
-      lap * 1e3, first * 1e3, o.run_in_mm);
+      ball * 1e3, interference * 1e3, z * 1e3,
+      o.laps == 1 ? "One" : std::to_string(o.laps) + " times a", lap * 1e3, first * 1e3,
+      o.run_in_mm);
   text.pop_back();
   text += fmt::format(" after.)\n({} points, chord tolerance {:g} um.)\n", path.size(),
                       o.chord_tolerance_um);
   text += modes(o, 17);
-  text += fmt::format("G0 {}\n", angles(begin.rotary));
-  text += "G43.4 H1 (RTCP: X Y Z are the ball centre in the workpiece)\n";
-  text += fmt::format("G0 {}\n", point(begin.p + away * begin.n + up));
-  text += fmt::format("G0 {}\n", point(begin.p + away * begin.n));
-  text += fmt::format("G1 {} F{:g} (approach along -n)\n", point(begin.p), o.approach_feed_mm_min);
-  if (o.settle_s > 0) text += fmt::format("G4 P{:g}\n", o.settle_s);
-  for (std::size_t i = 1; i < path.size(); ++i) {
-    text += fmt::format("G1 {} {}", point(path[i].p), angles(path[i].rotary));
-    if (i == 1) text += fmt::format(" F{:g}", o.feed_mm_min);
-    text += '\n';
+  for (int n = 0; n < o.laps; ++n) {
+    if (n > 0) text += "G49\n" + lift();
+    text += fmt::format("G0 {}\n", angles(begin.rotary));
+    text += "G43.4 H1 (RTCP: X Y Z are the ball centre in the workpiece)\n";
+    text += fmt::format("G0 {}\n", point(begin.p + away * begin.n + up));
+    text += fmt::format("G0 {}\n", point(begin.p + away * begin.n));
+    text +=
+        fmt::format("G1 {} F{:g} (approach along -n)\n", point(begin.p), o.approach_feed_mm_min);
+    if (o.settle_s > 0) text += fmt::format("G4 P{:g}\n", o.settle_s);
+    for (std::size_t i = 1; i < path.size(); ++i) {
+      text += fmt::format("G1 {} {}", point(path[i].p), angles(path[i].rotary));
+      if (i == 1) text += fmt::format(" F{:g}", o.feed_mm_min);
+      text += '\n';
+    }
+    if (o.settle_s > 0) text += fmt::format("G4 P{:g}\n", o.settle_s);
+    text += fmt::format("G1 {} F{:g} (leave along +n)\n", point(end.p + away * end.n),
+                        o.approach_feed_mm_min);
+    text += fmt::format("G0 {}\n", point(end.p + away * end.n + up));
   }
-  if (o.settle_s > 0) text += fmt::format("G4 P{:g}\n", o.settle_s);
-  text += fmt::format("G1 {} F{:g} (leave along +n)\n", point(end.p + away * end.n),
-                      o.approach_feed_mm_min);
-  text += fmt::format("G0 {}\n", point(end.p + away * end.n + up));
   return text + go_home();
 }
 

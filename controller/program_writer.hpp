@@ -7,7 +7,9 @@
 //
 // Scan laps follow Piece::scan_path. The lap begins an eighth of its length behind the first
 // station, on a face and away from its ends, and is preceded and followed by a run-in and run-out
-// of `run_in_mm` over the same stations, so the lap itself is run at full feed. Stations are
+// of `run_in_mm` over the same stations, so the lap itself is run at full feed. Between several
+// laps the ball leaves the surface and Z is lifted: each begins at rest where the first one did, so
+// that all take the same time to the cycle and can be compared as repetitions. Stations are
 // thinned: of the straight line between two points no station is off by more than the chord
 // tolerance. Coordinates have 5 decimals [mm] and 6 decimals [deg]: rounding stays below 0.01 um.
 #pragma once

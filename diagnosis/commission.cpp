@@ -145,14 +145,17 @@ bool is_driven(const Record& record, std::size_t axis) {
 
 class Commissioner {
  public:
+  /// `leaves_noise`: a machine whose remainder is the noise, where no laps tell it; null: the
+  /// declared one.
   Commissioner(const DiagnosisCase& of, const DiagnosisOptions& options,
-               const KeepGoing& keep_going)
+               const KeepGoing& keep_going, const Machine* leaves_noise)
       : of_(of),
         options_(options),
         keep_going_(keep_going),
         candidates_(of.candidates),
-        evidence_(of.record, of.replica, of.declared),
-        machine_(fit_declared(evidence_, of.declared)) {
+        evidence_(of.record, of.replica, of.declared) {
+    if (leaves_noise) evidence_.take_noise_from(*leaves_noise);
+    machine_ = fit_declared(evidence_, of.declared);
     for (Candidate& lag : lags(of.declared)) candidates_.push_back(std::move(lag));
   }
 
@@ -175,6 +178,11 @@ class Commissioner {
     fit_together();
     tell();
     return std::move(result_);
+  }
+
+  /// Whether something else is noise than this took for it.
+  bool mistook_noise() const {
+    return !evidence_.noise().from_repetitions && evidence_.noise_is_another_with(machine_.machine);
   }
 
  private:
@@ -303,7 +311,22 @@ class Commissioner {
 
 Commissioning commission(const DiagnosisCase& of, const DiagnosisOptions& options,
                          const KeepGoing& keep_going) {
-  return Commissioner(of, options, keep_going).run();
+  bool stopped = false;
+  const KeepGoing watched = [&](const DiagnosisProgress& progress) {
+    stopped = keep_going && !keep_going(progress);
+    return !stopped;
+  };
+  Commissioner first(of, options, watched, nullptr);
+  Commissioning result = first.run();
+  bool again = first.mistook_noise();
+  for (int round = 0; again && !stopped && round < kNoiseRounds; ++round) {
+    of.replica.anchor(of.declared);
+    Commissioner next(of, options, watched, &result.machine);
+    Commissioning better = next.run();
+    again = next.mistook_noise();
+    if (!stopped) result = std::move(better);
+  }
+  return result;
 }
 
 }  // namespace vcnc

@@ -119,14 +119,16 @@ struct Question {
 
 /// A search with everything that it was made with.
 struct Attempt {
-  /// `encoders`: a machine whose encoders make the noise; null: the declared one.
+  /// `encoders`: a machine whose encoders make the noise, and what it leaves, where no laps tell
+  /// that; null: the declared one.
   Attempt(const Question& question, FoundBeforehand known, const DiagnosisOptions& asked,
           const KeepGoing& keep_going, const Machine* encoders)
       : evidence(question.of.record, question.of.replica, question.declared,
                  question.difference ? question.difference->noise_scale : 1, question.left),
         before(std::move(known)) {
     const auto& [of, difference, declared, left] = question;
-    if (encoders) evidence.reckon_with_rounding(*encoders);
+    if (encoders && evidence.noise().from_repetitions) evidence.reckon_with_rounding(*encoders);
+    if (encoders && !evidence.noise().from_repetitions) evidence.take_noise_from(*encoders);
     before.chatter = find_chatter(evidence, declared, of.candidates,
                                   difference ? difference->noise : HealthyNoise{});
     for (const Chatter& c : before.chatter)
@@ -155,14 +157,24 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
                                    declared.probe.signal_period);
   if (before.slip) declared.effects.get<PeriodSlip>() = *before.slip;
   if (!difference) question.left = left_by_commissioning(declared, of.replica.channels());
+  const bool repeated = partition(of.record).repeated;
   auto search = std::make_unique<Attempt>(question, before, asked, keep_going, nullptr);
-  const Machine found = search->selection.found.machine;
-  bool anew = !search->selection.interrupted && search->evidence.underrates_rounding(found);
-  if (anew) {
+  const auto once_more = [&] {
+    const Machine found = search->selection.found.machine;
     of.replica.anchor(declared);
-    auto second = std::make_unique<Attempt>(question, before, asked, keep_going, &found);
-    anew = !second->selection.interrupted;
-    if (anew) search = std::move(second);
+    auto next = std::make_unique<Attempt>(question, before, asked, keep_going, &found);
+    if (next->selection.interrupted) return false;
+    std::swap(search, next);
+    return true;
+  };
+  bool anew = false;
+  if (repeated) {
+    anew = !search->selection.interrupted &&
+           search->evidence.underrates_rounding(search->selection.found.machine) && once_more();
+  } else {
+    for (int round = 0; round < kNoiseRounds && !search->selection.interrupted; ++round)
+      if (!search->evidence.noise_is_another_with(search->selection.found.machine) || !once_more())
+        break;
   }
   Diagnosis d = findings_of(of, search->evidence, search->options, std::move(search->selection),
                             std::move(search->before), difference != nullptr);

@@ -473,7 +473,7 @@ class Report {
   /// lap does alone is no deviation. Of an axis that vibrates by itself, and of what that makes of
   /// the readings, tell_chatter() tells.
   void tell_what_is_still_off() {
-    if (!evidence_.noise().from_repetitions || !before_.chatter.empty()) return;
+    if (!before_.chatter.empty()) return;
     const Prediction found = evidence_.predict(d_.found);
     const std::vector<double> before = evidence_.rms_within_laps(evidence_.predict(of_.declared),
                                                                  Role::held_out),
@@ -625,8 +625,6 @@ class Report {
       d_.verdict = not_identifiable;
     else if (d_.law || !d_.vibrations.empty())
       d_.verdict = named ? partly : unexplained;
-    else if (!evidence_.noise().from_repetitions)
-      d_.verdict = named ? explained : no_deviation;
     else if (named)
       d_.verdict = !still_off_ && (ratio < kQuiet || d_.explained_share > kAllExplained) ? explained
                                                                                          : partly;

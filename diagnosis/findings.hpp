@@ -17,7 +17,8 @@
 //
 // In absolute mode c > 1.1 after the fit is model form error: what the model and the machine do
 // differently by themselves. Its share of the excess is told and no effect may be called a cause.
-// Without repeated motions c says nothing and the words are those of what was found.
+// Without repeated motions noise is what the past of a remainder does not foretell of it
+// (noise_audit.hpp), and the words are the same.
 //
 // What moves the contour by less than 0.01 um and every signal by less than a tenth of its noise is
 // a note, not an effect.

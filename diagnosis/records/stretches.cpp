@@ -9,6 +9,7 @@
 
 #include "diagnosis/replica/commanded_motion.hpp"
 #include "model/axes.hpp"
+#include "model/math.hpp"
 
 namespace vcnc {
 namespace {
@@ -49,9 +50,14 @@ class Curve5 {
     for (const std::size_t axis : axes_) {
       const std::vector<double>& x = motion_.position[axis];
       const double there = part == 0 ? x[j] : x[j] + part * (x[j + 1] - x[j]);
-      largest = std::max(largest, std::abs(there - x[i]));
+      largest = std::max(largest, std::abs(way(axis, x[i], there)));
     }
     return largest;
+  }
+  /// From one position of an axis to another, whole turns of a rotary axis being none.
+  static double way(std::size_t axis, double from, double to) {
+    const double off = to - from;
+    return is_rotary(axis) && std::abs(off) > kPi ? std::remainder(off, 2 * kPi) : off;
   }
   /// Whether both run in the same direction.
   bool same_direction(std::size_t i, std::size_t j) const {
@@ -66,13 +72,13 @@ class Curve5 {
   }
   /// Where between j - 1 and j + 1 the curve is nearest to the sample i, on its tangent [samples].
   double nearest(std::size_t i, std::size_t j) const {
-    double way = 0, square = 0;
+    double along = 0, square = 0;
     for (const std::size_t axis : axes_) {
       const double v = motion_.velocity[axis][j] * h_;
-      way += v * (motion_.position[axis][i] - motion_.position[axis][j]);
+      along += v * way(axis, motion_.position[axis][j], motion_.position[axis][i]);
       square += v * v;
     }
-    return static_cast<double>(j) + (square > 0 ? std::clamp(way / square, -1.0, 1.0) : 0);
+    return static_cast<double>(j) + (square > 0 ? std::clamp(along / square, -1.0, 1.0) : 0);
   }
   /// Whether `count` samples from i and from j on know of the same forces.
   bool same_forces(std::size_t i, std::size_t j, std::size_t count) const {

@@ -2,9 +2,10 @@
 //
 // A part in which some axis moves is searched for laps: from a sample on, the commanded positions
 // of all axes come back to the same values after a time T, sample by sample, for at least one more
-// lap. What is no lap is one stretch from standstill to standstill or to the next laps. Two
-// stretches are of one condition when the commands at equal shares of both are the same and take
-// the same time, and the known forces of the one are those of the other within a twentieth.
+// lap; a rotary axis may have turned round in between. What is no lap is one stretch from
+// standstill to standstill or to the next laps. Two stretches are of one condition when the
+// commands at equal shares of both are the same and take the same time, and the known forces of the
+// one are those of the other within a twentieth.
 //
 // Laps need not be a whole number of samples: they begin at the samples next to k T.
 #pragma once

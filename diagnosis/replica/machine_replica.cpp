@@ -285,7 +285,8 @@ Deflections MachineReplica::reading_of(const Hypothesis& h, const AxisReplays& a
              anchor_->reading_offset, 1);
 }
 
-/// What was measured less `reading`, as a moving mean, a period of the signals at most.
+/// What was measured less `reading`, as a moving mean, a period of the signals at most. A sample's
+/// own noise is not in its mean: some of it would be foretold then.
 Deflections MachineReplica::off_record(const Deflections& reading) const {
   constexpr std::size_t kReach = 10;  // cycles
   const double most = declared_.probe.signal_period;
@@ -303,8 +304,9 @@ Deflections MachineReplica::off_record(const Deflections& reading) const {
     }
     for (std::size_t k = 0; k < n; ++k) {
       const std::size_t first = k > kReach ? k - kReach : 0, last = std::min(n, k + kReach + 1);
-      const double known = count[last] - count[first];
-      if (known > 0) off[c][k] = std::clamp((sum[last] - sum[first]) / known, -most, most);
+      const double known = count[last] - count[first] - (count[k + 1] - count[k]);
+      const double others = sum[last] - sum[first] - (sum[k + 1] - sum[k]);
+      if (known > 0) off[c][k] = std::clamp(others / known, -most, most);
     }
   }
   return off;

@@ -23,7 +23,7 @@
 //
 // Errors of the signals repeat with every few micrometres of deflection, and where the ball is, the
 // model may not know to one. They are therefore taken where the record says it was: moved by what
-// the record is off the anchor's reading, as a moving mean of 21 ms.
+// the record is off the anchor's reading, as a mean over 10 ms before and after.
 #pragma once
 
 #include <map>

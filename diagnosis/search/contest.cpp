@@ -139,10 +139,14 @@ std::vector<Contender> Contest::rivals(double least, std::size_t but) const {
 bool Contest::says_it_simpler(const Contender& rival, const AddedEffect& effect,
                               double gain) const {
   if (rival.released.empty() || rival.gain < gain - band_of(gain)) return false;
-  Contender present;
-  present.candidate = effect.candidate;
-  present.numbers = effect.numbers;
-  return intricacy(rival) + (gain - rival.gain) / band_of(gain) < intricacy(present);
+  return intricacy(rival) + (gain - rival.gain) / band_of(gain) < intricacy(effect);
+}
+
+double Contest::intricacy(const AddedEffect& effect) const {
+  Contender same;
+  same.candidate = effect.candidate;
+  same.numbers = effect.numbers;
+  return intricacy(same);
 }
 
 std::vector<std::size_t> Contest::equivalents(const std::vector<Contender>& contenders) const {

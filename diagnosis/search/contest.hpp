@@ -73,6 +73,9 @@ class Contest {
   /// Whether a declared number does as well as an effect that gains `gain`, and says less.
   bool says_it_simpler(const Contender& rival, const AddedEffect& effect, double gain) const;
 
+  /// How much it says: numbers that are something, and more where one is of an unusual size.
+  double intricacy(const AddedEffect& effect) const;
+
   /// Gains that differ by less are alike when the best is `gain`.
   double band_of(double gain) const;
   double held_out() const { return ground_.held_out; }

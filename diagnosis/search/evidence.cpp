@@ -14,6 +14,9 @@ namespace {
 constexpr double kShift = 10e-6;  // of a piece, to see what one does [m]
 /// Times what encoders were reckoned to make of a reading that they may make of it.
 constexpr double kUnderrated = 2;
+/// Part of the noise that there is at most where there is clearly less; times white noise that is
+/// left where it is clearly not white.
+constexpr double kQuieter = 0.8, kColoured = 1.1;
 /// Times what encoders usually make of a signal, or laps differ by, from which on they decide what
 /// an axis does; and how long before and after.
 constexpr double kUndecided = 6, kUndecidedReach = 0.02;  // [s]
@@ -122,7 +125,7 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
   leave_out_undecided(rounding);
   mask(rounding);
   mask(difference_);
-  noise_ = audit_noise(record_, partition_, replica_.channels(), difference_, rounding);
+  noise_ = audit_noise(record_, partition_, replica_.channels(), difference_, rounding, coloured_);
   for (std::size_t c = 0; c < noise_.channels.size(); ++c) {
     ChannelNoise& channel = noise_.channels[c];
     const double louder = c < form_.size() ? std::hypot(1, form_[c] / channel.rms) : 1;
@@ -136,6 +139,34 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
   if (!per_shift_.empty()) whiten_shifts(rms_shift(partition_.stretches, per_shift_, rounding));
   rms_of_rounding_ = rms_of_all(rounding);
   chi2_of_rounding_ = chi2_of(whiten(rounding), Role::held_out);
+}
+
+void Evidence::take_noise_from(const Machine& machine) {
+  difference_ = left_by(machine);
+  coloured_ = Coloured::noise;
+  reckon_with_rounding(machine);
+}
+
+bool Evidence::noise_is_another_with(const Machine& machine) const {
+  const SeriesOfChannels left = left_by(machine);
+  const NoiseAudit now = audit_noise(record_, partition_, replica_.channels(), left,
+                                     rounding_of(machine), Coloured::noise);
+  const std::vector<double> rms = rms_of_all(left);
+  for (std::size_t c = 0; c < now.channels.size(); ++c) {
+    const double sigma = noise_.channels[c].rms;
+    if (now.channels[c].rms < kQuieter * sigma) return true;
+    if (coloured_ == Coloured::deviation && rms[c] > kColoured * sigma) return true;
+  }
+  return false;
+}
+
+SeriesOfChannels Evidence::left_by(const Machine& machine) const {
+  const Prediction prediction = predict(machine);
+  SeriesOfChannels left = measured_;
+  for (std::size_t c = 0; c < left.size(); ++c)
+    for (std::size_t k = 0; k < left[c].size(); ++k) left[c][k] -= prediction[c][k];
+  mask(left);
+  return left;
 }
 
 bool Evidence::underrates_rounding(const Machine& machine) const {
@@ -406,7 +437,8 @@ std::vector<double> Evidence::rms_within_laps(const Prediction& prediction, Role
   for (std::size_t c = 0; c < off.size(); ++c)
     for (std::size_t k = 0; k < off[c].size(); ++k) off[c][k] -= prediction[c][k];
   mask(off);
-  if (!per_shift_.empty()) take_out_shifts(partition_.stretches, per_shift_, off, Shifts::constant);
+  if (!per_shift_.empty() && partition_.repeated)
+    take_out_shifts(partition_.stretches, per_shift_, off, Shifts::constant);
   for (const Block& block : partition_.blocks)
     for (std::size_t c = 0; block.once && c < off.size(); ++c)
       std::fill(off[c].begin() + static_cast<std::ptrdiff_t>(block.begin),

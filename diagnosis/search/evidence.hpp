@@ -58,6 +58,10 @@ using BlockGrams = std::vector<Eigen::MatrixXd>;
 
 enum class Role { fitted, held_out, both };
 
+/// Times that all is sought once more with less noise, what was found being none, where no laps
+/// tell the noise.
+inline constexpr int kNoiseRounds = 4;
+
 class Evidence {
  public:
   /// `declared` says which samples can be compared at all, and gives the residual whose repetitions
@@ -105,6 +109,10 @@ class Evidence {
   /// From now on noise is what encoders make of it in this machine; all drives count again. Not
   /// with columns made before.
   void reckon_with_rounding(const Machine& machine);
+  /// From now on noise is what this machine leaves, where laps do not tell it. As above.
+  void take_noise_from(const Machine& machine);
+  /// Whether some signal clearly has another noise then.
+  bool noise_is_another_with(const Machine& machine) const;
   /// W (y - yhat).
   Column residual(const Prediction& prediction) const;
   /// W (changed - base) / step.
@@ -154,6 +162,8 @@ class Evidence {
   /// where there are none.
   std::vector<SeriesOfChannels> readings_per_shift(const std::vector<Machine>& shifted) const;
   SeriesOfChannels rounding_of(const Machine& machine) const;
+  /// y - yhat where it can be compared.
+  SeriesOfChannels left_by(const Machine& machine) const;
   void leave_out(const std::vector<LapEvent>& events);
   void leave_out_undecided(const SeriesOfChannels& rounding);
   void count_valid();
@@ -177,6 +187,7 @@ class Evidence {
   std::vector<SeriesOfChannels> per_shift_;  ///< of the piece; empty without a probe
   double noise_scale_;
   std::vector<double> form_;
+  Coloured coloured_ = Coloured::deviation;
   NoiseAudit noise_;
   ShiftWhitening of_shifts_;
   /// What is reckoned with of the rounding of each channel: RMS, and held-out chi-square.

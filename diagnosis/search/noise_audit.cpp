@@ -13,6 +13,8 @@ namespace {
 
 using Series = std::vector<double>;
 
+constexpr double kDeviationPerMedian = 1.4826;  ///< of the sizes of normal numbers
+
 /// What a replica that computes in another order than the machine cannot be better than [SI].
 double exactness(const ComparedChannel& channel, const Series& residual) {
   switch (channel.kind) {
@@ -120,6 +122,21 @@ double left_by(const WhiteningFilter& filter, const std::vector<LapNoise>& laps)
   return count > 0 ? sum / count : 0;
 }
 
+/// The usual size of what a filter leaves of the laps, squared, whatever the largest are.
+double usually_left_by(const WhiteningFilter& filter, const std::vector<LapNoise>& laps) {
+  Series sizes;
+  for (const LapNoise& lap : laps)
+    for (std::size_t k = filter.a.size(); k < lap.value.size(); ++k) {
+      double z = lap.value[k];
+      for (std::size_t j = 0; j < filter.a.size(); ++j) z -= filter.a[j] * lap.value[k - 1 - j];
+      if (!std::isnan(z)) sizes.push_back(std::abs(z));
+    }
+  if (sizes.empty()) return 0;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return kDeviationPerMedian * kDeviationPerMedian * *middle * *middle;
+}
+
 /// Mean periodogram of the laps, all padded to one length.
 Series periodogram(const std::vector<LapNoise>& laps) {
   std::size_t longest = 0;
@@ -198,6 +215,25 @@ WhiteningFilter filter_of_once(const Partition& partition, const Series& residua
   return filter;
 }
 
+/// Noise of a channel whose laps nobody can compare, from what is not explained of it.
+ChannelNoise noise_of_unrepeated(const std::vector<LapNoise>& pieces, const Series& added,
+                                 double least, Coloured coloured) {
+  Series covariance = covariances(pieces);
+  for (std::size_t j = 0; j < added.size(); ++j) covariance[j] += added[j];
+  covariance[0] += least;
+  ChannelNoise noise;
+  noise.filter = fit_autoregression(covariance);
+  double of_filter = 1;  // variance that white noise of variance 1 has after it
+  for (const double a : noise.filter.a) of_filter += a * a;
+  const double rounded = added.empty() ? 0 : added[0];
+  noise.filter.scale =
+      std::sqrt(usually_left_by(noise.filter, pieces) + of_filter * (least + rounded));
+  noise.rms = noise.filter.scale / std::sqrt(of_filter);
+  if (coloured == Coloured::deviation) noise.filter = {.a = {}, .scale = noise.rms};
+  noise.once = noise.filter;
+  return noise;
+}
+
 double resolution_of(const Record& record, const ComparedChannel& channel) {
   const MeasuredSignal* signal = record.find(channel.kind, channel.axis);
   return signal ? signal->resolution : 0;
@@ -246,25 +282,28 @@ std::optional<double> lap_scatter(const Partition& partition, const std::vector<
 NoiseAudit audit_noise(const Record& record, const Partition& partition,
                        const std::vector<ComparedChannel>& channels,
                        const std::vector<std::vector<double>>& residual,
-                       const std::vector<std::vector<double>>& rounding) {
+                       const std::vector<std::vector<double>>& rounding, Coloured coloured) {
   NoiseAudit audit;
   audit.from_repetitions = partition.repeated;
   if (!partition.repeated)
     audit.warnings.push_back(
-        "No motion was repeated: the noise was estimated from the residual itself, which "
-        "underrates "
-        "every effect; how much is left unexplained cannot be told.");
+        "No motion was repeated: what its own past does not foretell of the residual counts as "
+        "noise, so that noise which is not white may be taken for a deviation.");
   for (std::size_t c = 0; c < channels.size(); ++c) {
-    std::vector<LapNoise> laps = lap_noise(partition, residual[c]);
-    if (laps.empty()) laps = whole_laps(partition, residual[c]);
-    Series covariance = covariances(laps);
-    const double of_laps = covariance[0];
     const Series of_rounding =
         rounding.empty() ? Series() : covariances(whole_laps(partition, rounding[c]));
-    for (std::size_t j = 0; j < of_rounding.size(); ++j) covariance[j] += of_rounding[j];
     const double resolution = resolution_of(record, channels[c]);
     const double least = resolution * resolution / 12 +
                          exactness(channels[c], residual[c]) * exactness(channels[c], residual[c]);
+    if (!partition.repeated) {
+      audit.channels.push_back(
+          noise_of_unrepeated(whole_laps(partition, residual[c]), of_rounding, least, coloured));
+      continue;
+    }
+    const std::vector<LapNoise> laps = lap_noise(partition, residual[c]);
+    Series covariance = covariances(laps);
+    const double of_laps = covariance[0];
+    for (std::size_t j = 0; j < of_rounding.size(); ++j) covariance[j] += of_rounding[j];
     ChannelNoise noise;
     noise.rms = std::sqrt(std::max(covariance[0], least));
     const bool quiet = covariance[0] < least;
@@ -276,11 +315,9 @@ NoiseAudit audit_noise(const Record& record, const Partition& partition,
     noise.filter.scale = std::sqrt(quiet || covariance[0] > of_laps ? expected : left);
     noise.of_laps = std::min(1.0, left / (noise.filter.scale * noise.filter.scale));
     noise.once = filter_of_once(partition, residual[c], of_rounding, noise.filter, covariance[0]);
-    if (audit.from_repetitions) {
-      const std::vector<NoiseLine> lines =
-          find_lines(channels[c], laps, record.period, 0.1 * std::sqrt(least));
-      audit.lines.insert(audit.lines.end(), lines.begin(), lines.end());
-    }
+    const std::vector<NoiseLine> lines =
+        find_lines(channels[c], laps, record.period, 0.1 * std::sqrt(least));
+    audit.lines.insert(audit.lines.end(), lines.begin(), lines.end());
     audit.channels.push_back(std::move(noise));
   }
   return audit;

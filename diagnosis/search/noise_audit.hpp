@@ -15,10 +15,14 @@
 // can predict it: a sample of it is added, which counts double what laps do show of it.
 //
 // A channel can never be quieter than its own step (q^2/12, Widrow 1956), nor than the replica is
-// exact. Without repetitions the filter is fitted to the residual itself: all it can predict from
-// its own past counts as noise, so that effects are underrated, not overrated. The same is done of
-// what was run once though other motions were repeated (the way to a circle and back), where that
-// differs from the model by more than the laps do from each other.
+// exact. Without repetitions the filter is fitted to the residual itself; s is 1.4826 times the
+// median size of what it leaves (the standard deviation if that is normal), which the few moments
+// do not change at which an axis turns over. White noise is what such a filter cannot foretell:
+// sigma = s / sqrt(1 + sum a_j^2). At first noise is white and of that size. If what is found
+// leaves more, all is done anew with the filter of that remainder (diagnose.cpp): what it can
+// predict from its own past has little weight then. The filter is fitted to the residual itself of
+// what was run once, too, though other motions were repeated (the way to a circle and back), where
+// that differs from the model by more than the laps do from each other.
 #pragma once
 
 #include <optional>
@@ -74,11 +78,16 @@ std::vector<NoiseLine> vibrations(const Record& record, const Partition& partiti
 /// RMS of what laps of a condition differ by; none where no sample is there in several laps.
 std::optional<double> lap_scatter(const Partition& partition, const std::vector<double>& series);
 
+/// What a remainder of motions that were not repeated is besides white noise: something to be
+/// explained, or noise, too, because what could be explained was taken off.
+enum class Coloured { deviation, noise };
+
 /// `residual` is one series per channel, NaN where there is nothing to compare; `rounding`
 /// likewise, or empty (Replica::rounding()).
 NoiseAudit audit_noise(const Record& record, const Partition& partition,
                        const std::vector<ComparedChannel>& channels,
                        const std::vector<std::vector<double>>& residual,
-                       const std::vector<std::vector<double>>& rounding = {});
+                       const std::vector<std::vector<double>>& rounding = {},
+                       Coloured coloured = Coloured::deviation);
 
 }  // namespace vcnc

@@ -9,12 +9,14 @@
 namespace vcnc {
 namespace {
 
-/// Pieces of equal length, a few per condition, for a record that nobody divided.
-std::vector<Stretch> even_stretches(std::size_t samples) {
+/// Pieces of equal length from `from` to `to`, a few per condition, where no motion says what is
+/// one.
+std::vector<Stretch> even_stretches(std::size_t from, std::size_t to) {
   constexpr std::size_t kPieces = 24, kPerCondition = 4;
   std::vector<Stretch> all;
   for (std::size_t i = 0; i < kPieces; ++i) {
-    const std::size_t begin = samples * i / kPieces, end = samples * (i + 1) / kPieces;
+    const std::size_t begin = from + (to - from) * i / kPieces,
+                      end = from + (to - from) * (i + 1) / kPieces;
     if (end > begin)
       all.push_back({begin, end, static_cast<int>(i / kPerCondition),
                      static_cast<int>(i % kPerCondition), "piece " + std::to_string(i + 1)});
@@ -25,6 +27,7 @@ std::vector<Stretch> even_stretches(std::size_t samples) {
 }  // namespace
 
 std::vector<std::vector<Stretch>> Partition::repetitions() const {
+  if (!repeated) return {};
   std::map<int, std::vector<Stretch>> laps;
   for (const Stretch& s : stretches) laps[s.condition].push_back(s);
   std::vector<std::vector<Stretch>> all;
@@ -40,7 +43,7 @@ std::vector<std::vector<Stretch>> Partition::repetitions() const {
 
 std::size_t Partition::conditions() const {
   std::set<int> all;
-  for (const Stretch& s : stretches) all.insert(s.condition);
+  for (const Block& b : blocks) all.insert(b.condition);
   return all.size();
 }
 
@@ -57,7 +60,10 @@ Partition partition(const Record& record) {
   for (const Stretch& s : p.stretches) ++repetitions[s.condition];
   p.repeated = std::any_of(repetitions.begin(), repetitions.end(),
                            [](const auto& c) { return c.second > 1; });
-  if (p.stretches.empty()) p.stretches = even_stretches(record.samples());
+  if (p.stretches.empty())
+    p.stretches = even_stretches(0, record.samples());
+  else if (!p.repeated)
+    p.stretches = even_stretches(p.stretches.front().begin, p.stretches.back().end);
 
   const auto second =
       static_cast<std::size_t>(std::max(1.0, std::round(1 / std::max(record.period, 1e-9))));

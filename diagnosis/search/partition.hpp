@@ -3,7 +3,8 @@
 // Effects are chosen and judged on data they were not fitted to. Of every condition every other
 // repetition is held out, by turns the early and the late ones, so that what changes with time is
 // seen by both; a record without repetitions is cut into pieces which are fitted and held out in
-// turn. Conditions, not samples, are the unit of evidence: see selection.hpp.
+// turn, a few neighbours being a condition. Conditions, not samples, are the unit of evidence: see
+// selection.hpp.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +24,7 @@ struct Block {
 };
 
 struct Partition {
-  std::vector<Stretch> stretches;  ///< of the record, or made up where it has none
+  std::vector<Stretch> stretches;  ///< of the record, or made up where nothing is repeated
   std::vector<Block> blocks;       ///< in order of time
   bool repeated = false;           ///< some condition was run more than once
 

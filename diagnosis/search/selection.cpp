@@ -4,6 +4,7 @@
 #include <cmath>
 #include <mutex>
 #include <numeric>
+#include <optional>
 #include <set>
 
 #include "diagnosis/search/contest.hpp"
@@ -21,6 +22,7 @@ constexpr std::size_t kAlternatives = 1;  ///< other beginnings
 constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to look for another one
 constexpr std::size_t kImitation = 3;  ///< names that are too many where one law does better
 constexpr double kHalf = 0.5;  ///< of what is left: for a further effect than few, or another one
+constexpr double kClearlySimpler = 0.5;  ///< numbers
 constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
 
 Explained minus(Explained x, const std::vector<double>& y) {
@@ -393,19 +395,54 @@ class Search {
       const auto better = std::find_if(rivals.begin(), rivals.end(), [&](const Contender& r) {
         return simpler(r) || r.worth() >= worth;
       });
-      if (better == rivals.end()) {
-        ++i;
-        continue;
+      if (better != rivals.end()) {
+        const double allowed_loss = simpler(*better) ? contest.band_of(lost) : -options_.least_gain;
+        FittedMachine instead = less;
+        add(instead, *better, {});
+        if (counted(instead, contest) >= counted(m, contest) - allowed_loss) {
+          m = std::move(instead);  // the last of its kind, so that the next one is here
+          continue;
+        }
+        rivals.erase(better);
       }
-      const double allowed_loss = simpler(*better) ? contest.band_of(lost) : -options_.least_gain;
-      add(less, *better, {});
-      if (counted(less, contest) < counted(m, contest) - allowed_loss) {
-        evidence_.anchor(m.machine);
-        ++i;
-        continue;
-      }
-      m = std::move(less);  // what came in is the last of its kind, so that the next one is here
+      if (effect && exchange_for_as_good(m, i, less, rivals, contest, lost)) continue;
+      evidence_.anchor(m.machine);
+      ++i;
     }
+  }
+
+  /// Sensitivities tell a large gain to some per mille only: rivals that promise as much are fitted
+  /// in full. Those that do as well are of one class with the effect; whether one of them that says
+  /// it more simply has taken its place.
+  bool exchange_for_as_good(FittedMachine& m, std::size_t i, const FittedMachine& less,
+                            const std::vector<Contender>& rivals, const Contest& contest,
+                            double lost) {
+    const double band = contest.band_of(lost), present = counted(m, contest);
+    std::optional<FittedMachine> simplest;
+    double least = contest.intricacy(m.added[i]);
+    std::vector<std::size_t> alike = m.added[i].class_with;
+    for (const Contender& r : rivals) {
+      if (!going_ || !r.released.empty() || r.gain < kAsGood * lost ||
+          std::count(alike.begin(), alike.end(), r.candidate) > 0)
+        continue;
+      FittedMachine instead = less;
+      add(instead, r, {});
+      const double less_counts = present - counted(instead, contest);
+      if (less_counts > band || instead.added.empty()) continue;
+      alike.push_back(r.candidate);
+      const double intricacy = contest.intricacy(instead.added.back()) + less_counts / band;
+      if (intricacy > least - kClearlySimpler) continue;
+      least = intricacy;
+      simplest = std::move(instead);
+    }
+    m.added[i].class_with = alike;
+    if (!simplest) return false;
+    alike.push_back(m.added[i].candidate);
+    m = std::move(*simplest);
+    std::erase(alike, m.added.back().candidate);
+    m.added.back().class_with = alike;
+    evidence_.anchor(m.machine);
+    return true;
   }
 
   FittedMachine removed(const FittedMachine& m, std::size_t i) const {

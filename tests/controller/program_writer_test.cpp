@@ -39,8 +39,9 @@ struct Lap {
   std::vector<ToolPose> poses;
 };
 
-/// The lap is what lies between the second and the third dwell (settle before and after).
-Lap lap_of(const std::vector<PlayerStep>& steps, const Machine& machine) {
+/// A lap is what lies between the second and the third dwell (settle before and after), the next
+/// one between the fourth and the fifth.
+Lap lap_of(const std::vector<PlayerStep>& steps, const Machine& machine, int which = 0) {
   const Kinematics kinematics(machine.kinematics, machine.tool_length(1),
                               machine.setup.work_offset[0]);
   Lap lap;
@@ -49,7 +50,7 @@ Lap lap_of(const std::vector<PlayerStep>& steps, const Machine& machine) {
   for (const PlayerStep& step : steps) {
     if (step.dwell && !waiting) ++dwells;
     waiting = step.dwell;
-    if (dwells != 2 || step.dwell) continue;
+    if (dwells != 2 + 2 * which || step.dwell) continue;
     lap.steps.push_back(step);
     lap.poses.push_back(kinematics.forward(step.position));
   }
@@ -166,7 +167,28 @@ TEST(ProgramWriter, OptionsReachTheProgram) {
     foot = piece->nearest(lap.poses[k].p_WT, foot);
     EXPECT_NEAR(foot.distance, machine.probe.ball_radius - 0.3e-3, 5.2e-6);
   }
-  EXPECT_GE(lap.steps.size(), 2 * 1094.0 / 1234 * 60e3);
+  EXPECT_GE(lap.steps.size(), 1094.0 / 1234 * 60e3);
+}
+
+/// Every lap begins at rest, so that all are repetitions to the sample.
+TEST(ProgramWriter, LapsAreTheSameMotion) {
+  for (const std::string name : {"trunnion", "head"})
+    for (const bool of_cone : {false, true}) {
+      const Machine machine = machine_of(name);
+      const auto piece = piece_of(of_cone ? "cone" : "s_eq1");
+      ProgramOptions options;
+      options.laps = 3;
+      const auto steps = play(of_cone ? cone_program(machine, *piece, options)
+                                      : s_piece_program(machine, *piece, options),
+                              machine);
+      expect_home(steps, machine);
+      const Lap first = lap_of(steps, machine, 0), last = lap_of(steps, machine, 2);
+      ASSERT_GT(first.steps.size(), 10'000U);
+      ASSERT_EQ(first.steps.size(), last.steps.size());
+      for (std::size_t k = 0; k < first.steps.size(); ++k)
+        for (std::size_t i = 0; i < kAxisCount; ++i)
+          ASSERT_NEAR(first.steps[k].position[i], last.steps[k].position[i], 1e-9) << k;
+    }
 }
 
 TEST(ProgramWriter, ConeLapHasTheToolAlongTheRuling) {

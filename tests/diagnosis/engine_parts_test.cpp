@@ -90,6 +90,18 @@ TEST(Partition, HoldsOutEveryOtherLapOfEveryCondition) {
     EXPECT_EQ(b.held_out, (p.stretches[b.stretch].repetition + b.condition) % 2 == 1);
 }
 
+TEST(Partition, OfOneLongMotionFitsAndHoldsOutInTurns) {
+  Record record = toy::commands(24000, 1);
+  record.stretches = {{0, 1000, 0, 0, "approach"}, {1000, 24000, 1, 0, "motion"}};
+  const Partition p = partition(record);
+  EXPECT_FALSE(p.repeated);
+  EXPECT_TRUE(p.repetitions().empty());
+  EXPECT_EQ(p.conditions(), 6U);
+  std::size_t held_out = 0;
+  for (const Block& b : p.blocks) held_out += b.held_out ? b.end - b.begin : 0;
+  EXPECT_EQ(held_out, 12000U);
+}
+
 TEST(LeastSquares, SolvesRosenbrockWithinBounds) {
   LeastSquaresProblem problem;
   problem.start = Eigen::Vector2d(-1.2, 1);
@@ -169,6 +181,19 @@ TEST(NoiseAudit, CountsWhatEncodersRoundOffThoughItRepeats) {
   EXPECT_NEAR(rms({}).rms, 30e-9, 1e-9);
   EXPECT_NEAR(rms({rounding}).rms, 50e-9, 1e-9);
   EXPECT_NEAR(rms({rounding}).filter.scale, 50e-9, 2e-9);
+}
+
+/// A force that turns over with the axis is no noise, though nothing was repeated.
+TEST(NoiseAudit, OfOneMotionIsWhatItsPastDoesNotForetell) {
+  Record record = toy::commands(24000, 1);
+  record.stretches = {{0, 24000, 0, 0, "motion"}};
+  std::vector<double> residual(record.samples());
+  for (std::size_t k = 0; k < residual.size(); ++k)
+    residual[k] = (k / 1500 % 2 == 0 ? 3e-6 : -3e-6) + 30e-9 * gaussian_noise(3, 0, k)[0];
+  const std::vector<ComparedChannel> channels{{SignalKind::position, 0}};
+  const NoiseAudit audit = audit_noise(record, partition(record), channels, {residual});
+  EXPECT_FALSE(audit.from_repetitions);
+  EXPECT_NEAR(audit.channels[0].rms, 30e-9, 2e-9);
 }
 
 /// Nobody knows what repeats of it, so all that its own past foretells counts as noise.

@@ -17,5 +17,7 @@ struct RunOfMachine {
 RunOfMachine reversals_in_the_air(const Effects& effects);
 /// Circles of the ball in a ring at several feeds, on a machine likewise.
 RunOfMachine circles_in_a_ring(const Effects& effects);
+/// One lap of S-EQ1.
+RunOfMachine lap_of_the_s_piece(const Effects& effects);
 
 }  // namespace vcnc

@@ -18,6 +18,7 @@ struct Laps {
   SeriesOfChannels difference;
 
   explicit Laps(std::uint64_t seed = 1) {
+    partition.repeated = true;
     for (std::size_t i = 0; i < kLaps; ++i)
       partition.stretches.push_back({i * kLap, (i + 1) * kLap, static_cast<int>(i % 2), 0, ""});
     for (std::uint64_t c = 0; c < kChannels.size(); ++c) {

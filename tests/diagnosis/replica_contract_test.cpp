@@ -96,7 +96,7 @@ TEST_P(ReplicaContract, ReproducesTheWholeMachine) {
   EXPECT_LT(of(full, deflection).rms, 1 * nm);
   EXPECT_LT(of(full, deflection).largest, 20 * nm);
   // The drift's ring of samples is coarser, which shows while the ball touches the piece first.
-  // Where the ball is slow the mean over 21 ms holds some of the signals' error itself.
+  // Where the ball is slow the mean over 20 ms holds some of the signals' error itself.
   const double coarse = GetParam() == "clock_drift"         ? 0.08
                         : GetParam().starts_with("signal_") ? 0.03
                                                             : 0.02;
