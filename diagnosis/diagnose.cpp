@@ -32,6 +32,8 @@ constexpr double kChangeOfForm = 0.05;
 
 /// Effects that are told between two runs of one machine: more are a law that nobody has named.
 constexpr std::size_t kMostChanges = 5, kFewChanges = 3;
+/// Effects that are enough to see what else is noise, where no laps tell it.
+constexpr std::size_t kEffectsAtFirst = 2;
 /// Part of what is left that each of them must explain: less is what those before got wrong.
 constexpr double kShareOfChange = 0.1;
 /// The same at a drive where one was found.
@@ -158,11 +160,13 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
   if (before.slip) declared.effects.get<PeriodSlip>() = *before.slip;
   if (!difference) question.left = left_by_commissioning(declared, of.replica.channels());
   const bool repeated = partition(of.record).repeated;
-  auto search = std::make_unique<Attempt>(question, before, asked, keep_going, nullptr);
+  DiagnosisOptions now = asked;
+  if (!repeated) now.max_effects = std::min(asked.max_effects, kEffectsAtFirst);
+  auto search = std::make_unique<Attempt>(question, before, now, keep_going, nullptr);
   const auto once_more = [&] {
     const Machine found = search->selection.found.machine;
     of.replica.anchor(declared);
-    auto next = std::make_unique<Attempt>(question, before, asked, keep_going, &found);
+    auto next = std::make_unique<Attempt>(question, before, now, keep_going, &found);
     if (next->selection.interrupted) return false;
     std::swap(search, next);
     return true;
@@ -172,9 +176,13 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
     anew = !search->selection.interrupted &&
            search->evidence.underrates_rounding(search->selection.found.machine) && once_more();
   } else {
-    for (int round = 0; round < kNoiseRounds && !search->selection.interrupted; ++round)
-      if (!search->evidence.noise_is_another_with(search->selection.found.machine) || !once_more())
-        break;
+    for (int round = 0; round < kNoiseRounds && !search->selection.interrupted; ++round) {
+      const FittedMachine& found = search->selection.found;
+      const bool all = found.found() < now.max_effects || now.max_effects == asked.max_effects;
+      if (all && !search->evidence.noise_is_another_with(found.machine)) break;
+      now.max_effects = asked.max_effects;
+      if (!once_more()) break;
+    }
   }
   Diagnosis d = findings_of(of, search->evidence, search->options, std::move(search->selection),
                             std::move(search->before), difference != nullptr);
