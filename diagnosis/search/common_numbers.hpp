@@ -45,8 +45,8 @@ class ReplicaOfChange final : public Replica {
   const std::vector<ComparedChannel>& channels() const override { return replica_.channels(); }
   Prediction predict(const Machine& hypothesis) const override;
   std::vector<Prediction> predict_all(const std::vector<Machine>& hypotheses) const override;
-  std::vector<std::vector<double>> rounding(const Machine& declared) const override {
-    return replica_.rounding(declared);
+  std::vector<std::vector<double>> rounding(const Machine& machine) const override {
+    return replica_.rounding(without_common(machine));
   }
   bool anchor(const Machine& machine) override;
 

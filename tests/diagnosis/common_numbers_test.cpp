@@ -23,6 +23,11 @@ class ProductReplica : public Replica {
     return {SharedSeries(std::vector<double>{product}), of_load_};
   }
 
+  /// As many as there are deviations: a whole machine knows nothing of common numbers.
+  std::vector<std::vector<double>> rounding(const Machine& m) const override {
+    return {std::vector<double>(m.effects.deviations.size())};
+  }
+
  private:
   SharedSeries series() const { return SharedSeries(std::vector<double>{load_}); }
 
@@ -46,6 +51,13 @@ std::vector<FreedNumber> damping_alone() {
   std::vector<FreedNumber> all = common_numbers(machine(0.3, 0));
   std::erase_if(all, [](const auto& n) { return n.number.key != kDamping; });
   return all;
+}
+
+TEST(CommonNumbers, DoNothingToWhatEncodersRoundOff) {
+  ProductReplica product;
+  const ReplicaOfChange change(product, machine(0.3, 0), damping_alone());
+  ASSERT_EQ(machine(0.3, 0, 0.1).effects.deviations.size(), 1U);
+  EXPECT_TRUE(change.rounding(machine(0.3, 0, 0.1)).front().empty());
 }
 
 TEST(CommonNumbers, AreWhatHasATolerance) {
