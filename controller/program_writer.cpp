@@ -59,8 +59,8 @@ std::string modes(const ProgramOptions& o, int plane) {
                      plane, o.tolerance_um * 1e-3);
 }
 
-std::string lift() { return "G91\nG28 Z0\nG90\n"; }
-std::string go_home() { return "G49\nG91\nG28 Z0\nG28 X0 Y0\nG28 A0 C0\nG90\nM30\n"; }
+std::string lift() { return "G49\nG91\nG28 Z0\n"; }
+std::string go_home() { return lift() + "G28 X0 Y0\nG28 A0 C0\nG90\nM30\n"; }
 
 /// A decimal without "-0.00000".
 std::string decimal(double value, int digits) {
@@ -178,7 +178,7 @@ std::string scan_program(const std::string& what, const Machine& machine, const 
                       o.chord_tolerance_um);
   text += modes(o, 17);
   for (int n = 0; n < o.laps; ++n) {
-    if (n > 0) text += "G49\n" + lift();
+    if (n > 0) text += lift() + "G90\n";
     text += fmt::format("G0 {}\n", angles(begin.rotary));
     text += "G43.4 H1 (RTCP: X Y Z are the ball centre in the workpiece)\n";
     text += fmt::format("G0 {}\n", point(begin.p + away * begin.n + up));

@@ -24,7 +24,8 @@ struct Commissioning {
 /// then gains of its loops, feed-forwards and lags, the best first, where held-out data ask for
 /// them; then all axes together, and what of the probe and the geometry (friction of the ball,
 /// damping, gains, cross-talk, latency, squareness, where the rotary axes lie) explains a twentieth
-/// of what is left; at last everything together.
+/// of what is left; at last everything together. Where no motion is repeated, all of it again with
+/// what that leaves as noise.
 Commissioning commission(const DiagnosisCase& of, const DiagnosisOptions& options = {},
                          const KeepGoing& keep_going = {});
 

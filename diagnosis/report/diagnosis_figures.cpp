@@ -160,8 +160,10 @@ std::string residual_figure(const Record& record, const ModelResiduals& residual
     const double upper = top - static_cast<double>(i) * height;
     text += block(b, before, 1, unit.factor) + block(a, after, 1, unit.factor) +
             margins(upper - 0.8 * height, upper) +
-            fmt::format("set yrange [{0:.6g}:{1:.6g}]\nset ylabel '{2} [{3}]' offset 0.5\n", -shown,
-                        shown, channel_name(residuals.channels[c]), unit.name);
+            fmt::format("set yrange [{:.6g}:{:.6g}]\n", -shown, shown) +
+            // gnuplot leaves a ylabel out beside long numbers.
+            fmt::format("set label 1 '{} [{}]' at screen 0.018,graph 0.5 rotate center\n",
+                        channel_name(residuals.channels[c]), unit.name);
     text += i + 1 < channels.size() ? "set format x ''\nset xlabel ''\n"
                                     : "set format x '%g'\nset xlabel 'time  [s]'\n";
     text += "plot " + line(b.c_str(), i == 0 ? "before" : "", kOrange) + ", " +

@@ -206,7 +206,7 @@ std::string diagnosis_page(const DiagnosisStory& story) {
       "<title>Diagnosis of {}</title>\n<style>{}{}</style></head>\n<body><main>\n",
       kDiagnosisMark, escaped(story.record.source), kPageStyle, kDiagnosisStyle);
   page += fmt::format(
-      "<h1>Diagnosis</h1>\n<p class=\"lead\">{}: {:.2f} s at {:.6g} Hz, {} laps; against {} "
+      "<h1>Diagnosis</h1>\n<p class=\"lead\">{}: {:.2f} s at {:.6g} Hz, {} motions; against {} "
       "({}).</p>\n<div class=\"verdict {}\"><b>{}</b><span>{}</span></div>\n",
       escaped(story.record.source), seconds, 1 / story.record.period, story.record.stretches.size(),
       escaped(d.declared.name),

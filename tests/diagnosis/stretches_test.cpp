@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "model/axes.hpp"
@@ -84,6 +85,32 @@ TEST(Stretches, LapsThatAreNoWholeNumberOfSamplesAreFound) {
   EXPECT_EQ(laps[2].repetition, 2);
   EXPECT_NE(laps[3].condition, laps[0].condition);  // the other way round
   EXPECT_EQ(laps[3].condition, laps[4].condition);
+}
+
+/// As around a cone without unwinding.
+TEST(Stretches, ARotaryAxisThatHasTurnedRoundHasComeBack) {
+  for (const std::size_t turning : {std::size_t{kC}, std::size_t{kZ}}) {
+    Motion2 m;
+    m.stand(0.3);
+    const std::size_t begin = m.size();
+    m.laps(0.02, 1.2347, 3.02);
+    const std::size_t end = m.size();
+    m.stand(0.3);
+    Record r = m.record();
+    std::vector<double> turn(m.size(), 0.0);
+    for (std::size_t k = begin; k < m.size(); ++k)
+      turn[k] = 2 * kPi * static_cast<double>(std::min(k, end - 1) - begin) / 1234.7;
+    r.signals.push_back({SignalKind::command, turning, "turn", turn, 0});
+    std::vector<Stretch> laps;
+    for (const Stretch& one : stretches_of(r))
+      if (std::abs(static_cast<double>(one.end - one.begin) - 1234.7) < 2) laps.push_back(one);
+    if (turning == kZ) {
+      EXPECT_TRUE(laps.empty());
+      continue;
+    }
+    ASSERT_EQ(laps.size(), 3U);
+    EXPECT_EQ(laps[0].condition, laps[2].condition);
+  }
 }
 
 TEST(Stretches, EqualPassesWithRestsBetweenAreOneCondition) {
