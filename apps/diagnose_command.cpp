@@ -121,8 +121,14 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
     d = diagnose(of, asked, keep_going);
   }
   progress.show("predicting test runs");
+  const bool interrupted = stop_requested();  // the diagnosis says so itself
   predict_tests(options, healthy, d.declared, d.found, d.figures);
-  if (stop_requested()) d.warnings.push_back("stopped before the end; what was found so far");
+  if (stop_requested() && !interrupted)
+    d.warnings.push_back("Interrupted: not all test runs are predicted.");
+  if (options.model.empty() && !d.effects.empty() && d.verdict != DiagnosisVerdict::explained)
+    d.notes.push_back(
+        "Declared is the machine that the run names, without any effect; --model MACHINE.toml says "
+        "which ones are believed present.");
   return d;
 }
 

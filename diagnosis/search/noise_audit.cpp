@@ -229,7 +229,11 @@ ChannelNoise noise_of_unrepeated(const std::vector<LapNoise>& pieces, const Seri
   noise.filter.scale =
       std::sqrt(usually_left_by(noise.filter, pieces) + of_filter * (least + rounded));
   noise.rms = noise.filter.scale / std::sqrt(of_filter);
-  if (coloured == Coloured::deviation) noise.filter = {.a = {}, .scale = noise.rms};
+  if (coloured == Coloured::deviation) {
+    Series alone = added.empty() ? Series(kWhiteningOrder + 1, 0.0) : added;
+    alone[0] = noise.rms * noise.rms;
+    noise.filter = fit_autoregression(alone);
+  }
   noise.once = noise.filter;
   return noise;
 }

@@ -18,11 +18,12 @@
 // exact. Without repetitions the filter is fitted to the residual itself; s is 1.4826 times the
 // median size of what it leaves (the standard deviation if that is normal), which the few moments
 // do not change at which an axis turns over. White noise is what such a filter cannot foretell:
-// sigma = s / sqrt(1 + sum a_j^2). At first noise is white and of that size. If what is found
-// leaves more, all is done anew with the filter of that remainder (diagnose.cpp): what it can
-// predict from its own past has little weight then. The filter is fitted to the residual itself of
-// what was run once, too, though other motions were repeated (the way to a circle and back), where
-// that differs from the model by more than the laps do from each other.
+// sigma = s / sqrt(1 + sum a_j^2). At first noise is white and of that size, with what encoders
+// round off. If what is found leaves more, all is done anew with the filter of that remainder
+// (diagnose.cpp): what it can predict from its own past has little weight then. The filter is
+// fitted to the residual itself of what was run once, too, though other motions were repeated (the
+// way to a circle and back), where that differs from the model by more than the laps do from each
+// other.
 #pragma once
 
 #include <optional>

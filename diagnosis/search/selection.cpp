@@ -151,8 +151,9 @@ class Search {
                                 const Contest& contest) {
     std::size_t numbers = contenders[than].numbers.size();
     const bool leaves = rules_.excess(trial.held_out) > options_.least_gain;
+    also_fitted_ = {trial};
     for (const Contender* other : as_good(contenders, than, leaves)) {
-      FittedMachine instead = fitted_with(now, *other, {});
+      FittedMachine instead = also_fitted_.emplace_back(fitted_with(now, *other, {}));
       const double more = std::max(
           1.0, 1.0 + static_cast<double>(other->numbers.size()) - static_cast<double>(numbers));
       const bool of_one_kind = other->released.empty() == contenders[than].released.empty();
@@ -426,7 +427,10 @@ class Search {
           std::count(alike.begin(), alike.end(), r.candidate) > 0)
         continue;
       FittedMachine instead = less;
-      add(instead, r, {});
+      if (const FittedMachine* known = fitted_before(less, r.candidate))
+        instead = *known;
+      else
+        add(instead, r, {});
       const double less_counts = present - counted(instead, contest);
       if (less_counts > band || instead.added.empty()) continue;
       alike.push_back(r.candidate);
@@ -443,6 +447,25 @@ class Search {
     m.added.back().class_with = alike;
     evidence_.anchor(m.machine);
     return true;
+  }
+
+  /// `m` with one more candidate, as it was fitted in full when the last effect was accepted; null:
+  /// it was not.
+  const FittedMachine* fitted_before(const FittedMachine& m, std::size_t candidate) const {
+    const auto found =
+        std::find_if(also_fitted_.begin(), also_fitted_.end(), [&](const FittedMachine& f) {
+          return f.added.size() == m.added.size() + 1 && f.added.back().candidate == candidate &&
+                 f.released.size() == m.released.size() &&
+                 std::equal(m.added.begin(), m.added.end(), f.added.begin(),
+                            [](const AddedEffect& x, const AddedEffect& y) {
+                              return x.candidate == y.candidate;
+                            }) &&
+                 std::equal(m.released.begin(), m.released.end(), f.released.begin(),
+                            [](const ReleasedNumber& x, const ReleasedNumber& y) {
+                              return x.key == y.key;
+                            });
+        });
+    return found == also_fitted_.end() ? nullptr : &*found;
   }
 
   FittedMachine removed(const FittedMachine& m, std::size_t i) const {
@@ -470,7 +493,8 @@ class Search {
   const DiagnosisOptions& options_;
   const KeepGoing& keep_going_;
   SelectionResult result_;
-  std::vector<TrialColumns> at_base_;  ///< the trials of the base machine
+  std::vector<TrialColumns> at_base_;       ///< the trials of the base machine
+  std::vector<FittedMachine> also_fitted_;  ///< with a contender that the last one was chosen over
   ContestRules rules_{
       evidence_, candidates_,
       options_,  result_.trials,

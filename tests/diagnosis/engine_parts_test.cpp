@@ -196,6 +196,26 @@ TEST(NoiseAudit, OfOneMotionIsWhatItsPastDoesNotForetell) {
   EXPECT_NEAR(audit.channels[0].rms, 30e-9, 2e-9);
 }
 
+/// What encoders round off is slow where an axis is: it counts for no more than that, white noise
+/// for what it is.
+TEST(NoiseAudit, OfOneMotionKnowsTheColourOfWhatEncodersRoundOff) {
+  Record record = toy::commands(24000, 1);
+  record.stretches = {{0, 24000, 0, 0, "motion"}};
+  std::vector<double> noise(record.samples()), rounding(record.samples());
+  for (std::size_t k = 0; k < noise.size(); ++k) {
+    noise[k] = 30e-9 * gaussian_noise(3, 0, k)[0];
+    rounding[k] = (k > 0 ? 0.98 * rounding[k - 1] : 0) + 20e-9 * gaussian_noise(4, 0, k)[0];
+  }
+  const std::vector<ComparedChannel> channels{{SignalKind::position, 0}};
+  const ChannelNoise of =
+      audit_noise(record, partition(record), channels, {noise}, {rounding}).channels[0];
+  EXPECT_NEAR(of.rms, std::hypot(30e-9, 20e-9 / std::sqrt(1 - 0.98 * 0.98)), 15e-9);
+  // Weight of a constant: that of white noise of the same size is 1 / rms.
+  const double constant =
+      std::abs(1 - std::accumulate(of.filter.a.begin(), of.filter.a.end(), 0.0)) / of.filter.scale;
+  EXPECT_LT(std::pow(constant * of.rms, 2), 0.1);
+}
+
 /// Nobody knows what repeats of it, so all that its own past foretells counts as noise.
 TEST(NoiseAudit, TakesWhatWasRunOnceForNoiseWhereItIsLouderThanTheLaps) {
   Record record = toy::commands(2048, 4);
