@@ -22,6 +22,7 @@ constexpr double kShows = 0.02;    ///< part of a gain that a channel must have 
 constexpr double kChance = 3;      ///< standard deviations of a sum of squares
 constexpr double kNothing = 0.03;  ///< of a typical size
 constexpr double kPromise = 0.3;   ///< of what is needed: worth a refit
+constexpr double kHope = 0.5;      ///< of what is needed: worth to be refitted to the end
 constexpr double kLeaves = 0.05;   ///< part of what is left that a winner may leave
 constexpr double kNearly = 0.99;   ///< part of a gain that may be as much when all is refitted
 constexpr std::size_t kElsewhere = 2;
@@ -303,8 +304,9 @@ void Contest::finish(std::vector<Contender>& all) const {
   std::stable_sort(all.begin(), all.end(),
                    [](const Contender& x, const Contender& y) { return x.gain > y.gain; });
   const double best = all.empty() ? 0 : all.front().gain;
+  const double least = std::max(0.5 * best, kHope * rules_.options.least_gain);
   std::size_t finalists = 0;
-  while (finalists < all.size() && all[finalists].gain >= 0.5 * best &&
+  while (finalists < all.size() && all[finalists].gain >= least &&
          (finalists < kFinalists || all[finalists].gain >= best - rules_.options.class_gain ||
           (finalists < kMoreRefits && all[finalists].gain >= kNearly * best)))
     ++finalists;

@@ -72,6 +72,7 @@ std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vect
 }
 
 constexpr double kNoStep = 1;         ///< chi-square that no step is worth
+constexpr double kMuch = 10;          ///< and that a part of the step is worth to be sought for
 constexpr double kBetter = 0.1;       ///< of what a step promises, that it may do better by
 constexpr double kFarthestStep = 64;  ///< times what sensitivities tell
 
@@ -94,7 +95,9 @@ bool step_towards(const Evidence& evidence, FittedMachine& m, const Refit& f,
   const auto misfit_of = [&](const FittedMachine& trial) {
     return misfit(evidence, trial.residual, weight, trial.nuisances.numbers);
   };
+  const bool much = least - f.fitted > kMuch;
   for (const double share : {1.0, 0.5, 0.2, 0.05}) {
+    if (share < 1 && !much) return false;
     FittedMachine trial = at(share);
     double now = misfit_of(trial);
     if (now > least && now - least < kNoStep) return false;
@@ -180,7 +183,8 @@ void converge_exactly(Evidence& evidence, FittedMachine& m) {
 /// Takes sensitivities of `which` where the machine stands and fits, until that changes nothing, or
 /// would, if gains go on to shrink as they do; `gain` is that of the fit before.
 void fit_in_rounds(Evidence& evidence, FittedMachine& m, const std::vector<std::size_t>& which,
-                   double gain = std::numeric_limits<double>::infinity()) {
+                   double gain = std::numeric_limits<double>::infinity(),
+                   const NoUse& no_use = {}) {
   constexpr int kLinearisations = 8;
   for (int round = 0; round < kLinearisations; ++round) {
     const double before = m.held_out, last = gain;
@@ -190,6 +194,7 @@ void fit_in_rounds(Evidence& evidence, FittedMachine& m, const std::vector<std::
     const double next =
         last > 0 && std::isfinite(last) ? gain * std::sqrt(std::abs(gain) / last) : gain;
     if (std::min(gain, next) < settled(evidence, m)) break;
+    if (m.held_out - kLinearisations * gain > no_use.much) break;
   }
 }
 
@@ -333,20 +338,21 @@ FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
   return m;
 }
 
-void settle_in(Evidence& evidence, FittedMachine& m) {
+void settle_in(Evidence& evidence, FittedMachine& m, const NoUse& no_use) {
+  constexpr double kNoGainYet = std::numeric_limits<double>::infinity();
   anchor_at(evidence, m);
-  fit_in_rounds(evidence, m, concerned(m));
+  fit_in_rounds(evidence, m, concerned(m), kNoGainYet, no_use);
   const bool far =
       std::any_of(m.nuisances.numbers.begin(), m.nuisances.numbers.end(),
                   [](const FreedNumber& n) { return std::abs(n.pull()) > kPulledFar; });
-  if (far) {
+  if (far && m.held_out > no_use.little && m.held_out < no_use.much) {
     FittedMachine anew = m;
     for (FreedNumber& n : anew.nuisances.numbers)
       if (n.tolerance > 0) n.value = n.centre;
     anew.machine = with(anew.machine, anew.nuisances.numbers);
     evidence.anchor(anew.machine);
     stay(evidence, anew);
-    fit_in_rounds(evidence, anew, every(anew));
+    fit_in_rounds(evidence, anew, every(anew), kNoGainYet, no_use);
     if (misfit(evidence, anew) < misfit(evidence, m))
       m = std::move(anew);
     else

@@ -71,10 +71,16 @@ void hold_common(FittedMachine& machine);
 /// Makes the replica exact at the machine and computes anew what it leaves.
 void anchor_at(Evidence& evidence, FittedMachine& machine);
 
+/// Chi-square of the held-out laps at which it is no use to fit on: no more than `little` can be
+/// gained by it, or what is left is `much` more than another machine leaves.
+struct NoUse {
+  double little = 0, much = std::numeric_limits<double>::infinity();
+};
+
 /// After an effect was added: takes the sensitivities of the declared numbers where the machine now
 /// stands and fits all together. Where the effect had been missing, some may have been pulled far;
 /// then fits again from the declarations, too, and keeps what is better.
-void settle_in(Evidence& evidence, FittedMachine& machine);
+void settle_in(Evidence& evidence, FittedMachine& machine, const NoUse& no_use);
 
 /// The declared machine with its nuisances fitted, or with these numbers.
 FittedMachine fit_declared(Evidence& evidence, const Machine& declared);

@@ -153,7 +153,8 @@ class Search {
     const bool leaves = rules_.excess(trial.held_out) > options_.least_gain;
     also_fitted_ = {trial};
     for (const Contender* other : as_good(contenders, than, leaves)) {
-      FittedMachine instead = also_fitted_.emplace_back(fitted_with(now, *other, {}));
+      FittedMachine instead =
+          also_fitted_.emplace_back(fitted_with(now, *other, {}, far_more_than(trial)));
       const double more = std::max(
           1.0, 1.0 + static_cast<double>(other->numbers.size()) - static_cast<double>(numbers));
       const bool of_one_kind = other->released.empty() == contenders[than].released.empty();
@@ -175,9 +176,10 @@ class Search {
 
   /// With a contender, everything fitted together.
   FittedMachine fitted_with(const FittedMachine& now, const Contender& contender,
-                            const std::vector<std::size_t>& equivalent) {
+                            const std::vector<std::size_t>& equivalent,
+                            double much = std::numeric_limits<double>::infinity()) {
     FittedMachine m = now;
-    add(m, contender, equivalent);
+    add(m, contender, equivalent, much);
     drop(m);
     hold_again(m);
     anchor_at(evidence_, m);
@@ -271,7 +273,14 @@ class Search {
     return *high - *low < 1e-9;
   }
 
-  void add(FittedMachine& m, const Contender& best, const std::vector<std::size_t>& equivalent) {
+  /// What a rival leaves that need not be fitted to the end.
+  double far_more_than(const FittedMachine& m) const {
+    return m.held_out + rules_.excess(m.held_out) + kClearLoss * options_.least_gain;
+  }
+
+  /// `much`: what is left where it is no use to fit on.
+  void add(FittedMachine& m, const Contender& best, const std::vector<std::size_t>& equivalent,
+           double much = std::numeric_limits<double>::infinity()) {
     const Explained explained =
         minus(evidence_.chi2_of(m.residual, Role::held_out), best.fit.held_out_of);
     if (!best.released.empty()) {
@@ -280,7 +289,7 @@ class Search {
       m.released.push_back({best.released, explained, equivalent});
       add_common(evidence_, m, options_.common);
       converge(evidence_, m);
-      settle_in(evidence_, m);
+      settle_in(evidence_, m, {rules_.floor + options_.least_gain, much});
       return;
     }
     // Numbers belong to the candidate whose keys they have; a pair brings two.
@@ -306,7 +315,7 @@ class Search {
     evidence_.anchor(m.machine);
     add_common(evidence_, m, options_.common);
     converge(evidence_, m);
-    settle_in(evidence_, m);
+    settle_in(evidence_, m, {rules_.floor + options_.least_gain, much});
   }
 
   /// Removes what the others can do without, and says what each one is worth.
@@ -430,7 +439,7 @@ class Search {
       if (const FittedMachine* known = fitted_before(less, r.candidate))
         instead = *known;
       else
-        add(instead, r, {});
+        add(instead, r, {}, far_more_than(m));
       const double less_counts = present - counted(instead, contest);
       if (less_counts > band || instead.added.empty()) continue;
       alike.push_back(r.candidate);
