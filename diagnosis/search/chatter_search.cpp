@@ -15,6 +15,8 @@ constexpr double kLoud = 300, kClear = 60, kPartOfNoise = 0.01;
 constexpr double kFrequency = 2;
 constexpr double kAmplitude = 30;  ///< differs as much as the frequency does by kFrequency
 constexpr double kAsStrong = 3;
+/// The same of a position that follows from the force, F / (m w^2).
+constexpr double kFollows = kAsStrong * kFrequency * kFrequency;
 constexpr double kSizes[] = {1.0 / 16, 0.25, 1, 4};
 constexpr double kBetween = 2;  ///< from one size to where the next begins
 
@@ -165,6 +167,10 @@ class ChatterSearch {
     const bool at_rest = chatter.unrest.at_rest && !chatter.has_line();
     const std::vector<Unrest> model = unrest_of(evidence_, prediction);
     double most = std::numeric_limits<double>::infinity();  // how unlike the signals are
+    const bool force_known = std::any_of(measured_.begin(), measured_.end(), [&](const Unrest& u) {
+      return u.channel == ComparedChannel{SignalKind::force, chatter.axis} &&
+             u.at_rest == at_rest && u.rms;
+    });
     for (std::size_t i = 0; i < model.size(); ++i) {
       const Unrest& is = measured_[i];
       if (!is_of_drive(is.channel, chatter.axis) || is.at_rest != at_rest) continue;
@@ -172,7 +178,8 @@ class ChatterSearch {
       const double was = before(healthy_, is), rms = std::hypot(*model[i].rms, was),
                    measured = std::max(*is.rms, was);
       if (measured <= 0) continue;
-      const double differs = factors(rms, measured, kAsStrong);
+      const bool follows = force_known && is.channel.kind == SignalKind::position;
+      const double differs = factors(rms, measured, follows ? kFollows : kAsStrong);
       most = std::isinf(most) ? differs : std::max(most, differs);
       if (is.channel.kind == chatter.unrest.channel.kind)
         does.unrest = {is.channel, is.at_rest, rms};

@@ -9,15 +9,17 @@
 // amplitude depend little on the size of a play and much on the stiffness behind it, which nobody
 // declares. So of the size no more is known than that it is among those that do so, and all causes
 // are one class. They explain the vibration where the model also vibrates as strongly, within a
-// factor of three in every signal of the drive; else they are what is likely.
+// factor of three in every signal of the drive; else they are what is likely. (The position of a
+// mass follows from the force by the frequency squared: where the force is recorded, that factor of
+// two counts as well.)
 // A line that is clear but not loud is told only where the model vibrates as strongly: every drive
 // hums a little.
 //
 // Play may also rattle without a line, faster than a record of 1 kHz can show, or only while the
 // axis stands, where no lap is compared. Then the drive is more restless than in the healthy run
 // (unrest.hpp), three times as much in some signal. Causes are those candidates that make the model
-// as restless in every signal under the same condition, in motion or at rest, within a factor of
-// three; without any, the drive is as good as any other.
+// as restless in every signal under the same condition, in motion or at rest, as strongly as above;
+// without any, the drive is as good as any other.
 //
 // Validity: frequencies below half the rate of the record; an axis of which the position or the
 // force is recorded. Limit cycles of play: Nordin & Gutman, Automatica 38 (2002) 1633-1649.

@@ -170,13 +170,15 @@ double settled(const Evidence& evidence, const FittedMachine& m) {
 }
 
 /// Fits where the replica is exact: what is found there may be where it is not any more.
-void converge_exactly(Evidence& evidence, FittedMachine& m) {
+void converge_exactly(Evidence& evidence, FittedMachine& m, const NoUse& no_use = {}) {
   constexpr int kAnchors = 4;
   for (int i = 0; i < kAnchors; ++i) {
+    const double before = m.held_out;
     converge(evidence, m);
     const double there = misfit(evidence, m);
     anchor_at(evidence, m);
     if (std::abs(there - misfit(evidence, m)) < settled(evidence, m)) break;
+    if (no_use.given_up(m.held_out, kAnchors * (before - m.held_out))) break;
   }
 }
 
@@ -189,12 +191,12 @@ void fit_in_rounds(Evidence& evidence, FittedMachine& m, const std::vector<std::
   for (int round = 0; round < kLinearisations; ++round) {
     const double before = m.held_out, last = gain;
     linearise(evidence, m, which);
-    converge_exactly(evidence, m);
+    converge_exactly(evidence, m, no_use);
     gain = before - m.held_out;
     const double next =
         last > 0 && std::isfinite(last) ? gain * std::sqrt(std::abs(gain) / last) : gain;
     if (std::min(gain, next) < settled(evidence, m)) break;
-    if (m.held_out - kLinearisations * gain > no_use.much) break;
+    if (no_use.given_up(m.held_out, kLinearisations * gain)) break;
   }
 }
 

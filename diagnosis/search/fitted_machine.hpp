@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <algorithm>
 #include <limits>
 #include <set>
 #include <string>
@@ -75,6 +76,9 @@ void anchor_at(Evidence& evidence, FittedMachine& machine);
 /// gained by it, or what is left is `much` more than another machine leaves.
 struct NoUse {
   double little = 0, much = std::numeric_limits<double>::infinity();
+
+  /// Whether so much is left that it stays too much if `hoped` is gained.
+  bool given_up(double left, double hoped) const { return left - std::max(0.0, hoped) > much; }
 };
 
 /// After an effect was added: takes the sensitivities of the declared numbers where the machine now
