@@ -1,8 +1,8 @@
 // A machine by hypothesis with everything that was computed at it, and fitting one.
 #pragma once
 
-#include <cstddef>
 #include <algorithm>
+#include <cstddef>
 #include <limits>
 #include <set>
 #include <string>

@@ -22,6 +22,12 @@ std::vector<const Column*> pointers(const std::vector<Column>& columns) {
   return all;
 }
 
+std::vector<Column> unpacked(const std::vector<PackedColumn>& columns) {
+  std::vector<Column> all;
+  for (const PackedColumn& c : columns) all.push_back(c.unpacked());
+  return all;
+}
+
 struct Gain {
   double gain = 0, counted = 0;
   Eigen::VectorXd size;
@@ -98,25 +104,25 @@ std::vector<TrialColumns> simulate_trials(const Evidence& evidence, const Machin
     for (std::size_t j = first; j < last; ++j) {
       Prediction& p = predictions[j - first];
       const auto& [t, d] = jobs[j];
-      all[t].columns[d] = evidence.sensitivity(prediction, p, 1);
+      all[t].columns[d] = PackedColumn(evidence.sensitivity(prediction, p, 1));
       all[t].consequence[d] = consequence(evidence, p, prediction);
       p.clear();
     }
     const double share = static_cast<double>(++done) / static_cast<double>(parts);
     if (!keep_going(share)) go = false;
   });
-  const Column nothing(Column::Channels(prediction.size()));
+  const PackedColumn nothing(Column(Column::Channels(prediction.size())));
   parallel_for(all.size(), [&](std::size_t t) {
-    for (Column& c : all[t].columns)
-      if (c.size() == 0) c = nothing;
-    const std::vector<const Column*> own = pointers(all[t].columns);
-    all[t].own = evidence.cross(own, own);
+    for (PackedColumn& c : all[t].columns)
+      if (!c.known()) c = nothing;
+    const std::vector<Column> columns = unpacked(all[t].columns);
+    all[t].own = evidence.cross(pointers(columns), pointers(columns));
   });
   return all;
 }
 
 void RememberedProducts::learn(const Evidence& evidence, const std::vector<const Column*>& others,
-                               const std::vector<Column>& columns) {
+                               const std::vector<PackedColumn>& columns) {
   const auto known = [&](const Column* other) {
     return std::find_if(others_.begin(), others_.end(),
                         [&](const Column& c) { return c.shares(*other); });
@@ -124,7 +130,8 @@ void RememberedProducts::learn(const Evidence& evidence, const std::vector<const
   std::vector<const Column*> missing;
   for (const Column* other : others)
     if (known(other) == others_.end()) missing.push_back(other);
-  const RoleGrams fresh = evidence.cross(missing, pointers(columns));
+  const std::vector<Column> own = missing.empty() ? std::vector<Column>{} : unpacked(columns);
+  const RoleGrams fresh = evidence.cross(missing, pointers(own));
   const auto rows = static_cast<Eigen::Index>(others.size()),
              cols = static_cast<Eigen::Index>(columns.size());
   RoleGrams all = RoleGrams::none(rows, cols, fresh.held_out_of.size());
@@ -163,7 +170,8 @@ std::vector<Screened> screen(const Evidence& evidence, const Ground& ground, con
   parallel_for(trials.size(), [&](std::size_t i) {
     all[i].trial = i;
     TrialColumns& t = trials[i];
-    if (std::all_of(t.columns.begin(), t.columns.end(), [](const Column& c) { return c.zero(); }))
+    if (std::all_of(t.columns.begin(), t.columns.end(),
+                    [](const PackedColumn& c) { return c.zero(); }))
       return;
     t.ground.learn(evidence, ground.columns, t.columns);
     Gain g = gain_of(ground, doubt, t.ground.products(), t.own);
@@ -181,7 +189,8 @@ Screened screen_pair(const Evidence& evidence, const Ground& ground, const Doubt
                      const std::vector<TrialColumns>& trials, std::size_t first,
                      std::size_t second) {
   const TrialColumns &a = trials[first], &b = trials[second];
-  const RoleGrams ab = evidence.cross(pointers(a.columns), pointers(b.columns));
+  const std::vector<Column> of_a = unpacked(a.columns), of_b = unpacked(b.columns);
+  const RoleGrams ab = evidence.cross(pointers(of_a), pointers(of_b));
   Gain g = gain_of(ground, doubt, beside(a.ground.products(), b.ground.products()),
                    bordered(a.own, ab, b.own));
   return {first, g.gain, g.counted, std::move(g.size)};

@@ -12,6 +12,7 @@
 #include "diagnosis/search/consequence.hpp"
 #include "diagnosis/search/counted_gain.hpp"
 #include "diagnosis/search/evidence.hpp"
+#include "diagnosis/search/packed_column.hpp"
 #include "diagnosis/search/refit.hpp"
 #include "diagnosis/search/trial.hpp"
 
@@ -22,7 +23,7 @@ class RememberedProducts {
  public:
   /// Computes what is not known yet of `columns` with `others`, and forgets all else.
   void learn(const Evidence& evidence, const std::vector<const Column*>& others,
-             const std::vector<Column>& columns);
+             const std::vector<PackedColumn>& columns);
   const RoleGrams& products() const { return products_; }  ///< of what was learnt last
 
  private:
@@ -33,7 +34,7 @@ class RememberedProducts {
 /// A trial with the columns of its directions, per step.
 struct TrialColumns {
   Trial trial;
-  std::vector<Column> columns;
+  std::vector<PackedColumn> columns;
   std::vector<Consequence> consequence;  ///< of each direction, per step
   RoleGrams own;                         ///< products of the columns with each other
   RememberedProducts ground;

@@ -10,6 +10,7 @@
 #include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/least_squares.hpp"
 #include "diagnosis/search/noise_audit.hpp"
+#include "diagnosis/search/packed_column.hpp"
 #include "diagnosis/search/selection.hpp"
 #include "diagnosis/search/trial_values.hpp"
 #include "toy_machine.hpp"
@@ -65,6 +66,30 @@ TEST(GenericLaws, TakeANameAwayWhereTheyClearlyDoBetter) {
   EXPECT_FALSE(takes_names_away(160, 1, 100, 60));
   EXPECT_TRUE(takes_names_away(170, 1, 100, 60));
   EXPECT_TRUE(takes_names_away(184300, 2, 184200, 9300));
+}
+
+TEST(PackedColumn, IsTheColumnToThirtyThousandthsOfWhatIsAround) {
+  Column::Channels channels(3);  // noise, nothing, and a spike beside what is small
+  for (std::size_t k = 0; k < 1000; ++k) {
+    channels[0].push_back(static_cast<float>(gaussian_noise(3, 0, k)[0]));
+    channels[2].push_back(k < 500 ? 1e-12F * static_cast<float>(k % 7) : (k == 900 ? -3e6F : 0));
+  }
+  const Column column(channels);
+  const Column back = PackedColumn(column).unpacked();
+  ASSERT_EQ(back.size(), 3U);
+  EXPECT_TRUE(back[1].empty());
+  double off = 0, squares = 0;
+  for (std::size_t k = 0; k < 1000; ++k) {
+    off += std::pow(back[0][k] - column[0][k], 2);
+    squares += std::pow(column[0][k], 2);
+    EXPECT_NEAR(back[2][k], column[2][k], k < 500 ? 1e-16 : 50);
+  }
+  EXPECT_LT(off, 1e-8 * squares);
+  EXPECT_GT(off, 0);
+  EXPECT_EQ(back[2][900], -3e6F);
+  EXPECT_FALSE(PackedColumn(column).zero());
+  EXPECT_TRUE(PackedColumn(Column(Column::Channels(3))).zero());
+  EXPECT_FALSE(PackedColumn().known());
 }
 
 TEST(Evidence, CleanResidualIsChiSquareWithOnePerSample) {

@@ -1,0 +1,33 @@
+// A column in half the memory: 16 bits a sample and one scale for every 256 of them.
+//
+// A sample is off by 1/65534 of the largest of its 256 at most, so that of the squares of a column
+// some 1e-9 are rounding: enough for what is kept by the hundred to say what is worth a closer
+// look.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "diagnosis/search/evidence.hpp"
+
+namespace vcnc {
+
+class PackedColumn {
+ public:
+  PackedColumn() = default;
+  explicit PackedColumn(const Column& column);
+
+  Column unpacked() const;
+  bool known() const { return channels_ != nullptr; }
+  bool zero() const;
+
+ private:
+  struct Channel {
+    std::vector<float> scale;
+    std::vector<std::int16_t> value;
+  };
+  std::shared_ptr<const std::vector<Channel>> channels_;  ///< copies share them
+};
+
+}  // namespace vcnc
