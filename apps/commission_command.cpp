@@ -7,6 +7,7 @@
 
 #include "analysis/whole_file.hpp"
 #include "apps/keep_memory.hpp"
+#include "apps/machine_output.hpp"
 #include "apps/node_options.hpp"
 #include "apps/progress_line.hpp"
 #include "apps/stop_signal.hpp"
@@ -28,6 +29,7 @@ int commission_command(const CommissionOptions& options) {
   std::error_code error;
   if (!options.model.empty() && std::filesystem::equivalent(options.model, options.out, error))
     throw InputError("--out " + options.out + ": is the declared machine itself");
+  check_machine_output(options.out);
   MachineReplica replica(record, declared, piece_of(declared, record));
   check_readings(record, replica.channels(), replica.predict(declared));
   if (replica.channels().empty())
@@ -45,9 +47,13 @@ int commission_command(const CommissionOptions& options) {
     std::cout << fmt::format("  {} = {}\n", n.key, with_interval(n));
   std::cout << figures_table(c.figures);
   for (const std::string& warning : c.warnings) std::cerr << "vcnc: " << warning << '\n';
+  if (stop_requested()) {
+    std::cout << options.out << ": interrupted, nothing is written\n";
+    return kExitInterrupted;
+  }
   write_whole_file(options.out, to_toml(c.machine));
   std::cout << "model: " << options.out << '\n';
-  return stop_requested() ? kExitInterrupted : kExitOk;
+  return kExitOk;
 }
 
 }  // namespace vcnc

@@ -9,6 +9,7 @@
 #include "analysis/whole_file.hpp"
 #include "apps/compensation_effect.hpp"
 #include "apps/compensation_for.hpp"
+#include "apps/machine_output.hpp"
 #include "apps/node_options.hpp"
 #include "configs/config.hpp"
 
@@ -41,6 +42,10 @@ void print(const std::vector<PassComparison>& passes) {
 int compensate_command(const CompensateOptions& options) {
   if (options.out.empty() && !options.measure)
     throw InputError("vcnc compensate: needs --out FILE, --measure or both");
+  std::error_code error;
+  if (std::filesystem::equivalent(options.machine, options.out, error))
+    throw InputError("--out " + options.out + ": is the machine itself");
+  if (!options.out.empty()) check_machine_output(options.out);
   const Machine machine = load_machine(options.machine, options.assignments, options.injections);
   const CompensationProposal proposal = compensation_for(machine);
   print(proposal.remarks);

@@ -139,7 +139,15 @@ int diagnose_command(const DiagnoseOptions& options) {
   catch_stop_signals();
   const Record record = load_record(options.run, options.map);
   const Machine declared = declared_machine(options.model, record);
-  if (!options.compare.empty()) return compare_models(options, record, declared);
+  if (!options.compare.empty()) {
+    if (!(options.out.empty() && options.suspects.empty() && options.without.empty()))
+      throw InputError(
+          "--compare-only: compares two models and writes nothing; --out, --suspect and --without "
+          "do not go with it");
+    return compare_models(options, record, declared);
+  }
+  for (const std::string& test : options.tests)
+    replica_of(load_record(test, options.map), declared);
   const bool bare = is_bare_encoder(record);
   if (bare && !(options.reference.empty() && options.tests.empty() && options.suspects.empty() &&
                 options.without.empty()))
@@ -156,6 +164,10 @@ int diagnose_command(const DiagnoseOptions& options) {
   std::cout << to_text(d);
   const int code = stop_requested() ? kExitInterrupted : kExitOk;
   if (folder.empty()) return code;
+  if (d.verdict == DiagnosisVerdict::interrupted && d.effects.empty()) {
+    std::cout << folder.string() << ": nothing is written\n";
+    return code;
+  }
   DiagnosisStory story{.diagnosis = d, .record = seen, .residuals = {}};
   if (replica) story.residuals = model_residuals(seen, *replica, d.declared, d.found);
   write_whole_file(folder / "diagnosis.json", to_json(d, record.source));

@@ -90,8 +90,6 @@ class Report {
     d_.suspects = options.suspects;
     const NoiseAudit& noise = evidence.noise();
     d_.warnings.insert(d_.warnings.end(), noise.warnings.begin(), noise.warnings.end());
-    if (selection_.interrupted)
-      d_.warnings.push_back("Interrupted: what was found until then is told.");
   }
 
   Diagnosis write() {
@@ -288,6 +286,16 @@ class Report {
   void tell_chatter() {
     for (const Chatter& chatter : before_.chatter) {
       const std::string_view axis = kAxisNames[chatter.axis];
+      if (chatter.of_model) {
+        d_.notes.push_back(fmt::format(
+            "The declared machine lets {} vibrate by itself ({}), the measured one does "
+            "not: what is declared of that drive is not what there is, and it was not "
+            "compared.",
+            axis, vibration(chatter.line)));
+        d_.vibrations.push_back(fmt::format(
+            "{} vibrates by itself in the declared machine and not in the measured one", axis));
+        continue;
+      }
       std::string text =
           chatter.has_line()
               ? fmt::format("{} vibrates by itself: {}", axis, vibration(chatter.line))
@@ -468,12 +476,18 @@ class Report {
       e.minor = e.contour_error_um < 0.02 * largest && e.contour_error_um < 0.5;
   }
 
+  /// Whether an axis that vibrates by itself moves a signal.
+  bool is_stirred(const ComparedChannel& channel) const {
+    return std::any_of(before_.chatter.begin(), before_.chatter.end(), [&](const Chatter& c) {
+      return channel.kind == SignalKind::deflection || channel.axis == c.axis;
+    });
+  }
+
   /// Tells signals that are still off by more than noise, and by more of what they were off than a
   /// model of something that was found may be wrong by, on fitted and on held-out laps: what one
-  /// lap does alone is no deviation. Of an axis that vibrates by itself, and of what that makes of
-  /// the readings, tell_chatter() tells.
+  /// lap does alone is no deviation. Of what an axis that vibrates by itself moves tell_chatter()
+  /// tells.
   void tell_what_is_still_off() {
-    if (!before_.chatter.empty()) return;
     const Prediction found = evidence_.predict(d_.found);
     const std::vector<double> before = evidence_.rms_within_laps(evidence_.predict(of_.declared),
                                                                  Role::held_out),
@@ -481,7 +495,7 @@ class Report {
                               fitted = evidence_.rms_within_laps(found, Role::fitted);
     for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c) {
       const double n = evidence_.count(c, Role::held_out);
-      if (n < kFewSamples) continue;
+      if (n < kFewSamples || is_stirred(evidence_.replica().channels()[c])) continue;
       const double form = c < options_.form_of_channel.size() ? options_.form_of_channel[c] / n : 0,
                    noise = evidence_.reckoned_with(c) * std::sqrt(1 + form), was = before[c],
                    is = after[c];
@@ -620,8 +634,10 @@ class Report {
     const bool excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),
                                      [](const Excitation& e) { return e.excited; });
     using enum DiagnosisVerdict;
-    if (evidence_.count(Role::held_out) < kFewSamples ||
-        (!excited && !named && !still_off_ && ratio < kQuiet))
+    if (selection_.interrupted)
+      d_.verdict = interrupted;
+    else if (evidence_.count(Role::held_out) < kFewSamples ||
+             (!excited && !named && !still_off_ && ratio < kQuiet))
       d_.verdict = not_identifiable;
     else if (d_.law || !d_.vibrations.empty())
       d_.verdict = named ? partly : unexplained;

@@ -19,6 +19,8 @@ namespace vcnc {
 
 namespace {
 
+constexpr std::size_t kShortestLap = 50;  // samples
+
 using Kind = ImportMap::Kind;
 
 /// A run of fewer samples says nothing.
@@ -283,15 +285,17 @@ class Importer {
                                    : lap.condition;
       auto& [number, repetition] =
           known.emplace(name, std::pair(static_cast<int>(known.size()), 0)).first->second;
-      add_stretch(static_cast<std::size_t>(std::clamp(std::round(from), 0.0, last)),
-                  static_cast<std::size_t>(std::clamp(std::round(to), 0.0, last)), number,
-                  repetition++, name);
+      const auto begin = static_cast<std::size_t>(std::clamp(std::round(from), 0.0, last)),
+                 end = static_cast<std::size_t>(std::clamp(std::round(to), 0.0, last));
+      if (end < begin + kShortestLap)
+        refuse(lap.lines, "laps.", "to_s", too_short(end > begin ? end - begin : 0));
+      record_.stretches.push_back({begin, end, number, repetition++, name});
     }
   }
 
-  void add_stretch(std::size_t begin, std::size_t end, int condition, int repetition,
-                   const std::string& label) {
-    if (end > begin) record_.stretches.push_back({begin, end, condition, repetition, label});
+  static std::string too_short(std::size_t samples) {
+    return fmt::format("a lap has {} samples of the run; at least {} are needed to tell its noise",
+                       samples, kShortestLap);
   }
 
   void cut_by_column() {
@@ -319,8 +323,12 @@ class Importer {
         auto& [number, repetition] =
             known.emplace(std::isfinite(of) ? of : 0, std::pair(static_cast<int>(known.size()), 0))
                 .first->second;
-        add_stretch(base_.index[begin], base_.index[i - 1] + 1, number, repetition++,
-                    conditions ? fmt::format("{} {:g}", conditions->name, of) : "lap");
+        const std::size_t first = base_.index[begin], end = base_.index[i - 1] + 1;
+        if (end < first + kShortestLap)
+          refuse(map_.lines, "", "lap_column", too_short(end - first));
+        record_.stretches.push_back(
+            {first, end, number, repetition++,
+             conditions ? fmt::format("{} {:g}", conditions->name, of) : "lap"});
       }
       begin = i;
     }

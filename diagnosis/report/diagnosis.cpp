@@ -14,6 +14,8 @@ std::string_view to_string(DiagnosisVerdict verdict) {
       return "NO DEVIATION";
     case DiagnosisVerdict::not_identifiable:
       return "NOT IDENTIFIABLE WITH THIS RUN";
+    case DiagnosisVerdict::interrupted:
+      return "INTERRUPTED";
   }
   return "";
 }

@@ -12,11 +12,12 @@
 namespace vcnc {
 
 enum class DiagnosisVerdict {
-  explained,        ///< the added effects leave nothing but noise
-  partly,           ///< they explain the share told
-  unexplained,      ///< something repeatable is there that nothing in the library does
-  no_deviation,     ///< the declared machine does what was measured
-  not_identifiable  ///< the run cannot tell
+  explained,         ///< the added effects leave nothing but noise
+  partly,            ///< they explain the share told
+  unexplained,       ///< something repeatable is there that nothing in the library does
+  no_deviation,      ///< the declared machine does what was measured
+  not_identifiable,  ///< the run cannot tell
+  interrupted        ///< before all was sought
 };
 std::string_view to_string(DiagnosisVerdict verdict);  ///< "EXPLAINED", "PARTLY", ...
 

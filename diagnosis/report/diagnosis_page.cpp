@@ -42,6 +42,7 @@ const char* verdict_class(DiagnosisVerdict v) {
       return "bad";
     case DiagnosisVerdict::partly:
     case DiagnosisVerdict::not_identifiable:
+    case DiagnosisVerdict::interrupted:
       break;
   }
   return "open";

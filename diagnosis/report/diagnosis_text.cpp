@@ -65,6 +65,9 @@ std::string verdict_sentence(const Diagnosis& d) {
              (d.effects.empty() ? "" : "; the piece is not where it is declared");
     case DiagnosisVerdict::not_identifiable:
       return "the run does not excite what it should tell";
+    case DiagnosisVerdict::interrupted:
+      return d.effects.empty() ? "nothing was found until then"
+                               : "found until then, not to the end";
   }
   return "";
 }

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <limits>
 
 #include "diagnosis/search/freed_number.hpp"
 #include "model/axes.hpp"
+#include "model/math.hpp"
 
 namespace vcnc {
 namespace {
@@ -13,6 +15,8 @@ namespace {
 /// Power over the noise around of a line, and of one that makes such a part of all noise.
 constexpr double kLoud = 300, kClear = 60, kPartOfNoise = 0.01;
 constexpr double kFrequency = 2;
+/// Part of a frequency within which a line is the same, and times the power that is clearly more.
+constexpr double kSameLine = 0.03, kClearlyMore = 4;
 constexpr double kAmplitude = 30;  ///< differs as much as the frequency does by kFrequency
 constexpr double kAsStrong = 3;
 /// The same of a position that follows from the force, F / (m w^2).
@@ -73,7 +77,7 @@ class ChatterSearch {
 
   /// Nothing but the axis where its drive is as it was.
   Chatter chatter_of(std::size_t axis) const {
-    Chatter c{.axis = axis, .line = {}, .unrest = {}, .causes = {}};
+    Chatter c{.axis = axis, .line = {}, .of_model = false, .unrest = {}, .causes = {}};
     for (const Unrest& u : measured_) {
       const double was = before(healthy_, u);
       if (!is_of_drive(u.channel, axis) || was <= 0 || !u.rms || *u.rms < c.times * was) continue;
@@ -82,8 +86,12 @@ class ChatterSearch {
     }
     const NoiseLine line = strongest(evidence_.noise().lines, axis, evidence_),
                     was = strongest(healthy_.lines, axis, evidence_);
-    if (line.strength > 0 && !(was.strength > 0 && line.amplitude < 2 * was.amplitude))
+    if (line.strength > 0 && !(was.strength > 0 && line.amplitude < 2 * was.amplitude)) {
       c.line = line;
+      c.of_model = power_at(line, evidence_.declared()[index_of(line.channel)]) >
+                   kClearlyMore * power_at(line, measured(line.channel));
+    }
+    if (c.of_model) return c;
     if (c.has_line() || c.is_restless()) c.causes = causes_of(c);
     // A line that is not loud is news only where the model has it as strongly.
     if (c.has_line() && c.line.strength < kLoud &&
@@ -108,6 +116,8 @@ class ChatterSearch {
       const double first = number_of(declared_, number.key), unit = number.typical;
       if (cause.high == 0) cause.low = first + unit * t.size / kBetween;
       cause.high = first + unit * t.size * kBetween;
+      cause.low = std::clamp(cause.low, number.min, number.max);
+      cause.high = std::clamp(cause.high, number.min, number.max);
       // Sizes go up by a constant factor: the middle one of those so far.
       cause.size = std::sqrt((cause.low - first) * (cause.high - first)) / unit;
       if (unlike(t, chatter) >= unlike(cause, chatter)) continue;
@@ -189,13 +199,55 @@ class ChatterSearch {
 
   /// The strongest line in a channel, as laps of a prediction differ.
   NoiseLine line_of(const Prediction& prediction, const ComparedChannel& channel) const {
-    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
-    const auto at = static_cast<std::size_t>(std::find(channels.begin(), channels.end(), channel) -
-                                             channels.begin());
+    const std::size_t at = index_of(channel);
+    const std::vector<double>& declared = evidence_.declared()[at];
     std::vector<double> change = prediction[at];
-    for (std::size_t k = 0; k < change.size(); ++k) change[k] -= evidence_.declared()[at][k];
-    return strongest(vibrations(evidence_.record(), evidence_.partition(), channel, change),
-                     channel.axis, evidence_);
+    for (std::size_t k = 0; k < change.size(); ++k) change[k] -= declared[k];
+    const NoiseLine line =
+        strongest(vibrations(evidence_.record(), evidence_.partition(), channel, change),
+                  channel.axis, evidence_);
+    const bool of_declared =
+        line.strength > 0 && power_at(line, declared) > power_at(line, prediction[at]);
+    return of_declared ? NoiseLine{} : line;
+  }
+
+  std::size_t index_of(const ComparedChannel& channel) const {
+    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
+    return static_cast<std::size_t>(std::find(channels.begin(), channels.end(), channel) -
+                                    channels.begin());
+  }
+
+  const std::vector<double>& measured(const ComparedChannel& channel) const {
+    return evidence_.record().find(channel.kind, channel.axis)->value;
+  }
+
+  /// Power about the frequency of a line of what laps of a series differ by: what they differ by
+  /// from a prediction may be the prediction's.
+  double power_at(const NoiseLine& line, const std::vector<double>& series) const {
+    constexpr int kReach = 10;  // frequencies on either side
+    double power = 0;
+    for (const std::vector<Stretch>& laps : evidence_.partition().repetitions()) {
+      const std::size_t length = laps.front().end - laps.front().begin;
+      std::vector<double> mean(length, 0.0);
+      for (const Stretch& lap : laps)
+        for (std::size_t k = 0; k < length; ++k)
+          mean[k] += series[lap.begin + k] / static_cast<double>(laps.size());
+      for (const Stretch& lap : laps)
+        for (int i = -kReach; i <= kReach; ++i) {
+          const double frequency = line.frequency * (1 + kSameLine * i / kReach);
+          const std::complex<double> turn =
+              std::polar(1.0, 2 * kPi * frequency * evidence_.record().period);
+          std::complex<double> sum = 0, wave = 1;
+          for (std::size_t k = 0; k < length; ++k, wave *= turn) {
+            const double d = series[lap.begin + k] - mean[k];
+            const double window = 1 - std::cos(2 * kPi * (static_cast<double>(k) + 0.5) /
+                                               static_cast<double>(length));
+            if (std::isfinite(d)) sum += d * window * wave;
+          }
+          power += std::norm(sum);
+        }
+    }
+    return power;
   }
 
   const Evidence& evidence_;

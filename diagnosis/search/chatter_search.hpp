@@ -12,6 +12,8 @@
 // factor of three in every signal of the drive; else they are what is likely. (The position of a
 // mass follows from the force by the frequency squared: where the force is recorded, that factor of
 // two counts as well.)
+// A line of the declared machine alone says that what is declared of its drive is not there; it has
+// no causes.
 // A line that is clear but not loud is told only where the model vibrates as strongly: every drive
 // hums a little.
 //
@@ -48,6 +50,7 @@ struct ChatterCause {
 struct Chatter {
   std::size_t axis = 0;
   NoiseLine line;                    ///< strongest, as measured; strength 0: none
+  bool of_model = false;             ///< the declared machine has it, the measured one has not
   Unrest unrest;                     ///< that of its signals which has grown most
   double times = 0;                  ///< what it was in the healthy run
   std::vector<ChatterCause> causes;  ///< the likest first; none: something outside the drive

@@ -203,6 +203,8 @@ std::vector<Contender> Contest::refitted(const std::vector<Screened>& list) cons
     all[i] = contender({list[i].trial}, list[i].size, list[i].gain);
     ++done;
   });
+  // What was stopped before it was tried.
+  std::erase_if(all, [](const Contender& c) { return c.fit.held_out_of.empty(); });
   return all;
 }
 

@@ -18,8 +18,11 @@ namespace {
 
 /// Lengths of laps of one condition differ by their start within a sample.
 constexpr std::size_t kSlack = 3;
-/// A reading is not told where it is off by more than this, of its roughness.
-constexpr double kUntold = 20;
+/// A reading is not told where it is off by more than this, of its roughness, and by more than
+/// this, of what it usually is: a model that is wrong by a little everywhere cancels.
+constexpr double kUntold = 20, kFarOff = 5;
+/// Part of the readings that may be left out without a word.
+constexpr double kLeftOut = 0.2;
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -36,21 +39,37 @@ double roughness(const std::vector<double>& value) {
   return second.empty() ? 0 : 1.4826 * median(std::move(second)) / std::sqrt(6.0);
 }
 
+/// Of the sizes of a series, what is known of it.
+double usual_size(const std::vector<double>& series) {
+  std::vector<double> sizes;
+  for (const double x : series)
+    if (std::isfinite(x)) sizes.push_back(std::abs(x));
+  return sizes.empty() ? 0 : median(std::move(sizes));
+}
+
 /// RMS of what the healthy machine is off the healthy run where it is told, per channel.
 PerAxis<double> leave_out_untold(Record& difference, const Record& now) {
   PerAxis<double> off{};
   for (MeasuredSignal& signal : difference.signals) {
     if (signal.kind != SignalKind::deflection) continue;
     const std::vector<double>& measured = now.find(signal.kind, signal.axis)->value;
-    const double most = kUntold * std::max(roughness(measured), signal.resolution);
+    std::vector<double> wrong(measured.size());
+    for (std::size_t k = 0; k < wrong.size(); ++k) wrong[k] = measured[k] - signal.value[k];
+    const double most = std::max(kUntold * std::max(roughness(measured), signal.resolution),
+                                 kFarOff * usual_size(wrong));
     if (most <= 0) continue;
-    double sum = 0, n = 0;
-    for (std::size_t k = 0; k < measured.size(); ++k) {
-      const double d = measured[k] - signal.value[k];
-      if (std::abs(d) > most) signal.value[k] = kMissing;
+    double sum = 0, n = 0, left_out = 0;
+    for (std::size_t k = 0; k < wrong.size(); ++k) {
+      const double d = wrong[k];
+      if (std::abs(d) > most) signal.value[k] = kMissing, ++left_out;
       if (std::abs(d) <= most) sum += d * d, n += 1;
     }
     off[signal.axis] = n > 0 ? std::sqrt(sum / n) : 0;
+    if (left_out > kLeftOut * (n + left_out))
+      difference.warnings.push_back(fmt::format(
+          "{}: {:.0f} % of the readings are left out, since the model is far off the healthy run "
+          "there.",
+          signal_name(signal.kind, signal.axis), 100 * left_out / (n + left_out)));
   }
   return off;
 }
@@ -58,7 +77,6 @@ PerAxis<double> leave_out_untold(Record& difference, const Record& now) {
 /// Without readings that are off by far more than most: moments of touching tell nothing of where
 /// the piece is.
 Record without_outliers(Record record, const Replica& replica, const Machine& declared) {
-  constexpr double kFarOff = 5;  // times the median
   const Prediction predicted = replica.predict(declared);
   for (std::size_t c = 0; c < predicted.size(); ++c) {
     const ComparedChannel& channel = replica.channels()[c];

@@ -141,6 +141,18 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
   chi2_of_rounding_ = chi2_of(whiten(rounding), Role::held_out);
 }
 
+std::vector<double> Evidence::rounding_reckoned() const {
+  std::vector<double> all = chi2_of_rounding_;
+  all.resize(noise_.channels.size(), 0.0);
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    const ComparedChannel& channel = replica_.channels()[c];
+    const double step = record_.find(channel.kind, channel.axis)->resolution;
+    const double of_step = step * step / 12 / (noise_.channels[c].rms * noise_.channels[c].rms);
+    all[c] += count(c, Role::held_out) * std::min(1.0, of_step);
+  }
+  return all;
+}
+
 void Evidence::take_noise_from(const Machine& machine) {
   difference_ = left_by(machine);
   coloured_ = Coloured::noise;

@@ -133,8 +133,8 @@ class Evidence {
   /// Held-out chi-square of every channel that encoders make in a machine beyond what was reckoned
   /// with; empty where nothing is rounded.
   std::vector<double> rounding_beyond_reckoned(const Machine& machine) const;
-  /// The same of what is reckoned with.
-  const std::vector<double>& rounding_reckoned() const { return chi2_of_rounding_; }
+  /// The same of what is reckoned with, and what the steps of the signals as recorded make.
+  std::vector<double> rounding_reckoned() const;
   /// RMS of y - yhat in SI over the samples that count.
   double rms(const Prediction& prediction, std::size_t channel, Role role) const;
 

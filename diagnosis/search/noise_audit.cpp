@@ -174,10 +174,12 @@ double running_median(const Series& power, std::size_t at) {
 std::vector<NoiseLine> find_lines(const ComparedChannel& channel, const std::vector<LapNoise>& laps,
                                   double period, double least) {
   constexpr double kStrength = 40;
-  constexpr std::size_t kLowest = 8;
+  constexpr std::size_t kLowest = 8, kShortest = 128;  // bins, samples
   std::vector<NoiseLine> lines;
+  if (std::none_of(laps.begin(), laps.end(),
+                   [](const LapNoise& l) { return l.value.size() > kShortest; }))
+    return lines;
   const Series power = periodogram(laps);
-  if (power.size() < 128) return lines;
   const double bin = 1 / (period * 2 * static_cast<double>(power.size()));
   const double mean_lap = std::accumulate(laps.begin(), laps.end(), 0.0,
                                           [](double s, const LapNoise& l) {

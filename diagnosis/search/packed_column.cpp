@@ -19,6 +19,12 @@ void each_piece(std::size_t n, F&& f) {
 }  // namespace
 
 PackedColumn::PackedColumn(const Column& column) {
+  std::size_t samples = 0;
+  for (std::size_t c = 0; c < column.size(); ++c) samples = std::max(samples, column[c].size());
+  if (samples < kLong) {
+    whole_ = column;
+    return;
+  }
   std::vector<Channel> channels(column.size());
   for (std::size_t c = 0; c < channels.size(); ++c) {
     const std::vector<float>& x = column[c];
@@ -37,7 +43,7 @@ PackedColumn::PackedColumn(const Column& column) {
 }
 
 Column PackedColumn::unpacked() const {
-  if (!channels_) return {};
+  if (!channels_) return whole_;
   Column::Channels channels(channels_->size());
   for (std::size_t c = 0; c < channels.size(); ++c) {
     const Channel& from = (*channels_)[c];
@@ -52,8 +58,9 @@ Column PackedColumn::unpacked() const {
 }
 
 bool PackedColumn::zero() const {
-  return !channels_ || std::all_of(channels_->begin(), channels_->end(),
-                                   [](const Channel& c) { return c.value.empty(); });
+  return channels_ ? std::all_of(channels_->begin(), channels_->end(),
+                                 [](const Channel& c) { return c.value.empty(); })
+                   : whole_.zero();
 }
 
 }  // namespace vcnc

@@ -1,4 +1,5 @@
-// A column in half the memory: 16 bits a sample and one scale for every 256 of them.
+// A column of a long record in half the memory: 16 bits a sample and one scale for every 256 of
+// them. One of a short record stays as it is.
 //
 // A sample is off by 1/65534 of the largest of its 256 at most, so that of the squares of a column
 // some 1e-9 are rounding: enough for what is kept by the hundred to say what is worth a closer
@@ -18,8 +19,11 @@ class PackedColumn {
   PackedColumn() = default;
   explicit PackedColumn(const Column& column);
 
+  /// Samples from which on a column is long.
+  static constexpr std::size_t kLong = 100000;
+
   Column unpacked() const;
-  bool known() const { return channels_ != nullptr; }
+  bool known() const { return channels_ || whole_.size() > 0; }
   bool zero() const;
 
  private:
@@ -27,7 +31,8 @@ class PackedColumn {
     std::vector<float> scale;
     std::vector<std::int16_t> value;
   };
-  std::shared_ptr<const std::vector<Channel>> channels_;  ///< copies share them
+  Column whole_;                                          ///< of a short record
+  std::shared_ptr<const std::vector<Channel>> channels_;  ///< of a long one; copies share them
 };
 
 }  // namespace vcnc

@@ -614,9 +614,27 @@ TEST(Diagnose, KeepsWhatWasFoundWhenInterrupted) {
   const Machine declared;
   const Diagnosis d = diagnose({record, replica, declared, toy::candidates()}, {},
                                [](const DiagnosisProgress&) { return false; });
-  ASSERT_FALSE(d.warnings.empty());
-  EXPECT_NE(d.warnings.back().find("Interrupted"), std::string::npos);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::interrupted);
   EXPECT_FALSE(d.figures.empty());
+}
+
+/// Whenever it is stopped, it ends with a word.
+TEST(Diagnose, CanBeInterruptedAnywhere) {
+  const Machine truth = toy::machine({{"effects.X.load_play.width_um", 2}});
+  const Record record = measured(truth, 8);
+  const Machine declared;
+  int asked = 0;
+  const auto stop_after = [&](int times) {
+    toy::ToyReplica replica(record);
+    asked = 0;
+    return diagnose({record, replica, declared, toy::candidates()}, {},
+                    [&](const DiagnosisProgress&) { return ++asked <= times; });
+  };
+  EXPECT_EQ(stop_after(1 << 30).verdict, DiagnosisVerdict::explained);
+  const int all = asked;
+  ASSERT_GT(all, 5);
+  for (int times = 0; times < all; times += std::max(1, all / 40))
+    EXPECT_EQ(stop_after(times).verdict, DiagnosisVerdict::interrupted) << times;
 }
 
 TEST(Commission, FindsFrictionOfAHealthyMachine) {
