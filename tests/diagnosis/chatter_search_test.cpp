@@ -105,6 +105,19 @@ TEST(ChatterSearch, OnlyHintsAtWhatVibratesOtherwise) {
   }
 }
 
+TEST(ChatterSearch, TellsAVibrationOfTheDeclaredMachineAlone) {
+  const Machine declared = toy::machine({{"effects.X.load_play.width_um", 8}});
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, {}, 7);
+  VibratingReplica replica(record);
+  const Diagnosis d = diagnose({record, replica, declared, drive_candidates()});
+  EXPECT_TRUE(d.effects.empty());
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::unexplained);
+  EXPECT_TRUE(std::any_of(d.notes.begin(), d.notes.end(), [](const std::string& n) {
+    return n.starts_with("The declared machine lets X vibrate by itself (position X");
+  }));
+}
+
 TEST(ChatterSearch, WhatVibratedBeforeIsNoNews) {
   const Record now = vibrating(kHertz, 10, 3), healthy = vibrating(kHertz, 10, 4);
   VibratingReplica replica(now), of_healthy(healthy);

@@ -439,6 +439,28 @@ TEST(Diagnose, ReferenceRunCancelsWhatTheModelGetsWrong) {
   EXPECT_EQ(none.verdict, DiagnosisVerdict::no_deviation);
 }
 
+/// Far more than a reading is rough, but everywhere.
+TEST(Diagnose, BetweenTwoRunsReadingsCountThatTheModelMissesByAGain) {
+  const auto louder = [](Record record) {
+    for (MeasuredSignal& s : record.signals)
+      if (s.kind == SignalKind::deflection)
+        for (double& x : s.value) x *= 1.02;
+    return record;
+  };
+  const Machine common = toy::machine({{"effects.geometry.squareness.xy_urad", 300}}),
+                more = toy::machine({{"effects.geometry.squareness.xy_urad", 330}});
+  const Record healthy = louder(measured(common, 61)), sick = louder(measured(more, 62));
+  toy::ToyReplica of_healthy(healthy), of_sick(sick);
+  const DifferentialRecord difference = less_healthy(sick, healthy_run(healthy, of_healthy, {}));
+  const std::vector<double>& left = difference.record.find(SignalKind::deflection, 0)->value;
+  const auto known =
+      std::count_if(left.begin(), left.end(), [](double x) { return std::isfinite(x); });
+  EXPECT_GT(static_cast<double>(known), 0.9 * static_cast<double>(left.size()));
+  const Diagnosis d = diagnose({sick, of_sick, {}, toy::candidates()}, difference);
+  ASSERT_EQ(d.effects.size(), 1U);
+  EXPECT_EQ(d.effects[0].name, "squareness");
+}
+
 /// A reading that the model gets wrong by a wave over the lap that no effect makes.
 Record with_wave(Record record, double wave_um) {
   for (MeasuredSignal& s : record.signals)

@@ -194,6 +194,18 @@ TEST(ImportTable, LapsByTimeAndByColumn) {
   EXPECT_EQ(by_column.stretches[2].repetition, 2);
 }
 
+TEST(ImportTable, RefusesLapsTooShortToTellTheirNoise) {
+  const std::string by_time =
+      refusal(sound_map() + "[[laps]]\nfrom_s = 0\nto_s = 0.02\n[[laps]]\nfrom_s = 1\nto_s = 2\n");
+  EXPECT_NE(by_time.find("laps.to_s: a lap has 20 samples of the run; at least 50 are needed"),
+            std::string::npos)
+      << by_time;
+  // A column that changes in every sample.
+  const std::string by_column = refusal("lap_column = \"cmd\"\n" + sound_map());
+  EXPECT_NE(by_column.find("map.toml:1: lap_column: a lap has 1 sample"), std::string::npos)
+      << by_column;
+}
+
 TEST(ImportTable, RefusesWhatTheMapCannotMean) {
   EXPECT_NE(refusal(kTime + signal("posi", "position", "X", "m"))
                 .find("map.toml:5: signals.column: \"posi\" is no column of run.csv; did you mean "

@@ -145,6 +145,19 @@ TEST_F(DiagnoseCli, RunsAreComparedLessTheHealthyOneOfTheirProgram) {
       << suspicion.out;
   expect_refused("diagnose " + sicker + " --model " + machine + " --suspect X.rust",
                  "--suspect: \"X.rust\" is no effect");
+  expect_refused("diagnose " + sicker + " --compare-only " + machine + " --suspect X.coulomb",
+                 "--compare-only: compares two models and writes nothing");
+  expect_refused("diagnose " + sicker + " --suspect X.coulomb --test " + (scratch_ / "nowhere"),
+                 "nowhere: no such file");
+  // Nothing of the user's is lost where a machine is written.
+  const std::string recording = sicker + "/recording.h5", before = read_text(recording);
+  expect_refused("commission " + sicker + " --model " + machine + " --out " + recording,
+                 "exists and is no machine file");
+  expect_refused("commission " + sicker + " --out " + (scratch_ / "no/where.toml"),
+                 "there is no folder");
+  EXPECT_EQ(read_text(recording), before);
+  expect_refused("compensate " + sick + "/machine.toml --out " + sick + "/machine.toml",
+                 "is the machine itself");
   EXPECT_GT(off("run", ""), 150);
   EXPECT_NEAR(off("run", less), 0, 1e-6);  // the healthy run is as far off
   const double alone = off(sicker, tests);
