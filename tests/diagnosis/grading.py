@@ -262,7 +262,8 @@ def beside_the_oracle(strong, left_out):
     out = {}
     some = [r for r in strong if "oracle" in r]
     if some:
-        worst = [max(v / r["oracle"]["rms"][s] for s, v in r["left"]["rms"].items()) for r in some]
+        worst = [max(v / r["oracle"]["rms"][s] for s, v in r["left"]["rms"].items() if r["oracle"]["rms"][s] > 0)
+                 for r in some]
         all_signals = [math.sqrt(r["left"]["after"] / r["oracle"]["after"]) for r in some]
         for text, ratios in (("all signals", all_signals), ("worst signal", worst)):
             out[f"held-out RMS / oracle's, {text}, median / p95"] = (
