@@ -146,14 +146,15 @@ int diagnose_command(const DiagnoseOptions& options) {
           "do not go with it");
     return compare_models(options, record, declared);
   }
-  for (const std::string& test : options.tests)
-    replica_of(load_record(test, options.map), declared);
   const bool bare = is_bare_encoder(record);
   if (bare && !(options.reference.empty() && options.tests.empty() && options.suspects.empty() &&
                 options.without.empty()))
     throw InputError(
         "--reference, --test, --suspect, --without: are for machines, not for the signals of an "
         "encoder");
+  // What cannot be predicted is refused before anything is sought.
+  for (const std::string& test : options.tests)
+    replica_of(load_record(test, options.map), declared);
   const std::string page = "report.html";
   std::filesystem::path folder;
   if (!options.out.empty()) folder = page_folder(options.out, page, kDiagnosisMark);

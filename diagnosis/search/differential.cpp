@@ -7,8 +7,10 @@
 #include <tuple>
 #include <utility>
 
+#include "configs/config.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/records/signal_name.hpp"
+#include "diagnosis/replica/fingerprint.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/fitted_machine.hpp"
 #include "diagnosis/search/freed_number.hpp"
@@ -39,8 +41,8 @@ double roughness(const std::vector<double>& value) {
   return second.empty() ? 0 : 1.4826 * median(std::move(second)) / std::sqrt(6.0);
 }
 
-/// Of the sizes of a series, what is known of it.
-double usual_size(const std::vector<double>& series) {
+/// Median of the sizes of what is known of a series.
+double median_size(const std::vector<double>& series) {
   std::vector<double> sizes;
   for (const double x : series)
     if (std::isfinite(x)) sizes.push_back(std::abs(x));
@@ -56,7 +58,7 @@ PerAxis<double> leave_out_untold(Record& difference, const Record& now) {
     std::vector<double> wrong(measured.size());
     for (std::size_t k = 0; k < wrong.size(); ++k) wrong[k] = measured[k] - signal.value[k];
     const double most = std::max(kUntold * std::max(roughness(measured), signal.resolution),
-                                 kFarOff * usual_size(wrong));
+                                 kFarOff * median_size(wrong));
     if (most <= 0) continue;
     double sum = 0, n = 0, left_out = 0;
     for (std::size_t k = 0; k < wrong.size(); ++k) {
@@ -83,14 +85,10 @@ Record without_outliers(Record record, const Replica& replica, const Machine& de
     if (channel.kind != SignalKind::deflection) continue;
     for (MeasuredSignal& signal : record.signals) {
       if (signal.kind != channel.kind || signal.axis != channel.axis) continue;
-      std::vector<double> off(signal.value.size()), known;
-      for (std::size_t k = 0; k < off.size(); ++k) {
+      std::vector<double> off(signal.value.size());
+      for (std::size_t k = 0; k < off.size(); ++k)
         off[k] = std::abs(signal.value[k] - predicted[c][k]);
-        if (std::isfinite(off[k])) known.push_back(off[k]);
-      }
-      if (known.empty()) continue;
-      const double most =
-          std::max(kFarOff * median(std::move(known)), kUntold * roughness(signal.value));
+      const double most = std::max(kFarOff * median_size(off), kUntold * roughness(signal.value));
       for (std::size_t k = 0; k < off.size(); ++k)
         if (off[k] > most) signal.value[k] = kMissing;
     }
@@ -127,6 +125,21 @@ void check_known_forces(const Record& now, const Record& healthy) {
                         (now.find(kind, axis) ? healthy : now).source));
 }
 
+/// Throws MeasurementError where both runs say on which machine they were made and these are built
+/// otherwise.
+void check_same_kinematics(const Record& now, const Record& healthy) {
+  if (now.machine_toml.empty() || healthy.machine_toml.empty()) return;
+  const auto kinematics = [](const Record& record) {
+    Fingerprint print;
+    Machine machine = parse_machine(record.machine_toml, record.source);
+    KinematicsParams::fields(machine.kinematics, print);
+    return print.bytes();
+  };
+  if (kinematics(now) != kinematics(healthy))
+    throw MeasurementError(healthy.source +
+                           ": was measured on a machine of other kinematics than " + now.source);
+}
+
 }  // namespace
 
 HealthyRun healthy_run(const Record& record, Replica& replica, const Machine& declared) {
@@ -151,6 +164,7 @@ bool same_program(const Record& now, const Record& healthy) {
 
 DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
   check_known_forces(now, healthy.record);
+  check_same_kinematics(now, healthy.record);
   DifferentialRecord result{.record = now, .noise = healthy.noise, .healthy = healthy.machine};
   std::size_t fewest = 0, unmatched = 0;
   for (MeasuredSignal& signal : result.record.signals) {

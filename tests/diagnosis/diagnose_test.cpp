@@ -7,6 +7,7 @@
 #include <set>
 #include <tuple>
 
+#include "configs/config.hpp"
 #include "diagnosis/commission.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
@@ -574,6 +575,20 @@ TEST(Diagnose, TellsALimitThoughItIsTriedAndNotFitted) {
   ASSERT_EQ(d.effects.size(), 1U);
   EXPECT_EQ(d.effects[0].name, "range_clip");
   EXPECT_NEAR(number_of(d.found, "effects.probe.range_clip.limit_mm"), 4.5e-3, 0.1e-3);
+}
+
+TEST(LessHealthy, RefusesARunOfAMachineThatIsBuiltOtherwise) {
+  Record healthy = measured({}, 45), now = measured({}, 46);
+  Machine other;
+  other.kinematics.p_MC += Vec3(0, 1e-3, 0);
+  toy::ToyReplica of_healthy(healthy);
+  const auto less = [&] { return less_healthy(now, healthy_run(healthy, of_healthy, {})); };
+  now.machine_toml = to_toml(Machine{});
+  EXPECT_NO_THROW(less());  // of the other nothing is known
+  healthy.machine_toml = now.machine_toml;
+  EXPECT_NO_THROW(less());
+  healthy.machine_toml = to_toml(other);
+  EXPECT_THROW(less(), MeasurementError);
 }
 
 TEST(LessHealthy, RefusesForcesThatOneRunKnowsAlone) {
