@@ -42,6 +42,10 @@ int commission_command(const CommissionOptions& options) {
   const Commissioning c =
       commission({record, replica, declared, candidates(declared)}, {}, keep_going);
   progress.clear();
+  if (c.numbers.empty() && !stop_requested())
+    throw InputError(record.source +
+                     ": nothing moves in it that says anything of the declared machine; nothing is "
+                     "written");
   for (const std::string& note : c.notes) std::cout << note << '\n';
   for (const FittedNumber& n : c.numbers)
     std::cout << fmt::format("  {} = {}\n", n.key, with_interval(n));

@@ -153,8 +153,11 @@ int diagnose_command(const DiagnoseOptions& options) {
         "--reference, --test, --suspect, --without: are for machines, not for the signals of an "
         "encoder");
   // What cannot be predicted is refused before anything is sought.
-  for (const std::string& test : options.tests)
-    replica_of(load_record(test, options.map), declared);
+  for (const std::string& test : options.tests) {
+    const Record predicted = load_record(test, options.map);
+    check_same_kinematics(record, predicted);
+    replica_of(predicted, declared);
+  }
   const std::string page = "report.html";
   std::filesystem::path folder;
   if (!options.out.empty()) folder = page_folder(options.out, page, kDiagnosisMark);

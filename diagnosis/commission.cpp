@@ -8,6 +8,7 @@
 #include <map>
 
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/replica/model_comparison.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/intervals.hpp"
@@ -135,12 +136,15 @@ std::string told(const Candidate& c) {
   return c.effect == "deviation" ? c.place : c.effect;
 }
 
-/// Whether an axis is told to move at all.
+/// Whether an axis is told to move, or moves, at all.
 bool is_driven(const Record& record, std::size_t axis) {
-  const MeasuredSignal* command = record.find(SignalKind::command, axis);
-  if (!command) return record.find(SignalKind::position, axis) != nullptr;
-  const auto [low, high] = std::minmax_element(command->value.begin(), command->value.end());
-  return *high - *low > 1e-6;
+  const MeasuredSignal* motion = record.find(SignalKind::command, axis);
+  if (!motion) motion = record.find(SignalKind::position, axis);
+  if (!motion) return false;
+  double low = HUGE_VAL, high = -HUGE_VAL;
+  for (const double q : motion->value)
+    if (std::isfinite(q)) low = std::min(low, q), high = std::max(high, q);
+  return high - low > 1e-6;
 }
 
 class Commissioner {
@@ -311,6 +315,12 @@ class Commissioner {
 
 Commissioning commission(const DiagnosisCase& of, const DiagnosisOptions& options,
                          const KeepGoing& keep_going) {
+  bool moves = false;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) moves |= is_driven(of.record, axis);
+  if (!moves)
+    throw MeasurementError(of.record.source +
+                           ": no axis moves; a model can only be fitted to "
+                           "motion");
   bool stopped = false;
   const KeepGoing watched = [&](const DiagnosisProgress& progress) {
     stopped = keep_going && !keep_going(progress);

@@ -25,7 +25,7 @@ struct Commissioning {
 /// them; then all axes together, and what of the probe and the geometry (friction of the ball,
 /// damping, gains, cross-talk, latency, squareness, where the rotary axes lie) explains a twentieth
 /// of what is left; at last everything together. Where no motion is repeated, all of it again with
-/// what that leaves as noise.
+/// what that leaves as noise. Throws MeasurementError where no axis moves.
 Commissioning commission(const DiagnosisCase& of, const DiagnosisOptions& options = {},
                          const KeepGoing& keep_going = {});
 

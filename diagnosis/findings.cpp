@@ -476,6 +476,23 @@ class Report {
       e.minor = e.contour_error_um < 0.02 * largest && e.contour_error_um < 0.5;
   }
 
+  /// Signals whose recorded steps may make what is left of them; empty unless that is all that is
+  /// left. Half a step, the most that rounding is off, has three times the variance of an even
+  /// spread.
+  std::vector<std::size_t> rounded_away() const {
+    const Column& residual = selection_.base.residual;
+    const std::vector<double> left = evidence_.chi2_of(residual, Role::held_out),
+                              floor = noise_floor(evidence_, residual, options_.form_of_channel);
+    std::vector<std::size_t> channels;
+    for (std::size_t c = 0; c < left.size(); ++c) {
+      const double excess = left[c] - floor[c];
+      if (excess <= kFloorScatter * floor[c]) continue;
+      if (excess > 2 * evidence_.share_of_steps(c) * evidence_.count(c, Role::held_out)) return {};
+      channels.push_back(c);
+    }
+    return channels;
+  }
+
   /// Whether an axis that vibrates by itself moves a signal.
   bool is_stirred(const ComparedChannel& channel) const {
     return std::any_of(before_.chatter.begin(), before_.chatter.end(), [&](const Chatter& c) {
@@ -625,9 +642,19 @@ class Report {
                                            Role::held_out)
                           : selection_.base.held_out);
     const double after = excess(withdrawn_ ? selection_.base.held_out : told_held_out_);
-    const double ratio = 1 + after / std::max(1.0, floor_);
     // A piece that lies elsewhere is no fault of the machine.
     const bool named = std::any_of(d_.effects.begin(), d_.effects.end(), is_of_machine);
+    double ratio = 1 + after / std::max(1.0, floor_);
+    if (ratio >= kQuiet && !named && !still_off_ && !d_.law && d_.vibrations.empty())
+      for (const std::size_t c : rounded_away()) {
+        const ComparedChannel& channel = evidence_.replica().channels()[c];
+        const ShownUnit unit = shown_unit(channel);
+        d_.notes.push_back(
+            fmt::format("{} is recorded in steps of {:.3g} {}; what is left of it is no more than "
+                        "those can make.",
+                        channel_name(channel), evidence_.step_of(c) * unit.factor, unit.name));
+        ratio = 1;
+      }
     d_.chi2 = {before + floor_, after + floor_, floor_};
     d_.explained_share = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
     d_.left = ratio < kQuiet ? 0 : std::sqrt(ratio);

@@ -8,6 +8,7 @@
 #include "diagnosis/records/import_table.hpp"
 #include "diagnosis/records/record_file.hpp"
 #include "diagnosis/records/record_from_recording.hpp"
+#include "diagnosis/replica/fingerprint.hpp"
 
 namespace vcnc {
 
@@ -30,12 +31,33 @@ Record load_record(const std::string& path, const std::string& map) {
 }
 
 Machine declared_machine(const std::string& model, const Record& record) {
-  if (!model.empty()) return load_machine(model);
+  if (!model.empty()) {
+    const Machine machine = load_machine(model);
+    if (!record.machine_toml.empty() &&
+        parse_machine(record.machine_toml, record.source).kinematics.type !=
+            machine.kinematics.type)
+      throw MeasurementError(record.source + ": was measured on a machine of another type than " +
+                             model + " (kinematics.type)");
+    return machine;
+  }
   if (record.machine_toml.empty())
     throw MeasurementError(record.source +
                            ": does not say on which machine it was measured; --model MACHINE.toml "
                            "is needed");
   return parse_machine(record.machine_toml, record.source);
+}
+
+void check_same_kinematics(const Record& run, const Record& other) {
+  if (run.machine_toml.empty() || other.machine_toml.empty()) return;
+  const auto kinematics = [](const Record& record) {
+    Fingerprint print;
+    Machine machine = parse_machine(record.machine_toml, record.source);
+    KinematicsParams::fields(machine.kinematics, print);
+    return print.bytes();
+  };
+  if (kinematics(run) != kinematics(other))
+    throw MeasurementError(other.source + ": was measured on a machine of other kinematics than " +
+                           run.source);
 }
 
 std::optional<PieceParams> piece_of(const Machine& machine, const Record& record) {

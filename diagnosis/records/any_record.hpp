@@ -12,8 +12,14 @@ namespace vcnc {
 /// InputError naming the file and what is wrong with it.
 Record load_record(const std::string& path, const std::string& map = "");
 
-/// The machine file, or, without one, what the record says it was measured on.
+/// The machine file, or, without one, what the record says it was measured on. Throws
+/// MeasurementError where the record says neither, or that its machine carries its rotary axes
+/// elsewhere than that of the file.
 Machine declared_machine(const std::string& model, const Record& record);
+
+/// Throws MeasurementError where both runs say on which machine they were made and these have other
+/// kinematics.
+void check_same_kinematics(const Record& run, const Record& other);
 
 /// The piece of a machine: the record's own, else the file that the machine names.
 std::optional<PieceParams> piece_of(const Machine& machine, const Record& record);

@@ -86,6 +86,8 @@ class TextTable {
     const std::string_view line = trimmed_end(text_.substr(0, end));
     text_.remove_prefix(std::min(end + 1, text_.size()));
     ++line_;
+    if (line.find('\r') != line.npos)
+      fail(line_, "lines end with a carriage return alone; end them with a line feed");
     const std::string_view content = trimmed(line);
     if (content.empty()) return;
     if (content.front() == '#' || content.front() == '%') {

@@ -23,6 +23,7 @@ constexpr double kBelongs = 0.7;      ///< correlation of what belongs together
 constexpr double kFits = 0.95;        ///< ... of what certainly does
 constexpr double kSlope = 0.1;        ///< how far a slope may be off 1
 constexpr double kLead = 2e-3;        ///< [s] that no feed-forward makes by itself
+constexpr double kMoves = 1e-4;       ///< [m or rad] of a command that every position shows
 constexpr std::size_t kFewestSteps = 500;
 
 struct Spread {
@@ -246,7 +247,16 @@ class Checker {
 
   void check_command(const MeasuredSignal& s) {
     const MeasuredSignal* own = record_.find(SignalKind::command, s.axis);
-    if (!own || constant(own->value) || constant(s.value)) return;
+    if (!own || constant(own->value)) return;
+    if (constant(s.value)) {
+      const double span = spread_of(own->value).span();
+      if (span > kMoves)
+        refuse(
+            fmt::format("{} stays where it is while {} moves by {:.4g} {}: another column, or "
+                        "an encoder that is not connected",
+                        name(s), name(*own), span, is_rotary(s.axis) ? "rad" : "m"));
+      return;
+    }
     const Series moved = speed_of(s);
     const Relation r = relate(speed_of(*own), moved);
     if (!r.known) return;

@@ -51,9 +51,10 @@ std::string verdict_sentence(const Diagnosis& d) {
       return fmt::format(
           "what was added explains {:.0f} % of what was to be explained{}", d.explained_share * 100,
           d.model_form_share > 0
-              ? fmt::format("; {:.0f} % is an error of the model's form, so no cause "
-                            "is named",
-                            d.model_form_share * 100)
+              ? fmt::format(
+                    "; {:.0f} % is an error of the model's form, so what is named goes along "
+                    "with it and need not be its cause",
+                    d.model_form_share * 100)
               : "");
     case DiagnosisVerdict::unexplained:
       if (d.law) return d.law->words;

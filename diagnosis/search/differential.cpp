@@ -7,10 +7,9 @@
 #include <tuple>
 #include <utility>
 
-#include "configs/config.hpp"
+#include "diagnosis/records/any_record.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/records/signal_name.hpp"
-#include "diagnosis/replica/fingerprint.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/fitted_machine.hpp"
 #include "diagnosis/search/freed_number.hpp"
@@ -123,21 +122,6 @@ void check_known_forces(const Record& now, const Record& healthy) {
             fmt::format("{}: {} is known here and not in {}; a healthy run needs the same forces",
                         (now.find(kind, axis) ? now : healthy).source, signal_name(kind, axis),
                         (now.find(kind, axis) ? healthy : now).source));
-}
-
-/// Throws MeasurementError where both runs say on which machine they were made and these are built
-/// otherwise.
-void check_same_kinematics(const Record& now, const Record& healthy) {
-  if (now.machine_toml.empty() || healthy.machine_toml.empty()) return;
-  const auto kinematics = [](const Record& record) {
-    Fingerprint print;
-    Machine machine = parse_machine(record.machine_toml, record.source);
-    KinematicsParams::fields(machine.kinematics, print);
-    return print.bytes();
-  };
-  if (kinematics(now) != kinematics(healthy))
-    throw MeasurementError(healthy.source +
-                           ": was measured on a machine of other kinematics than " + now.source);
 }
 
 }  // namespace

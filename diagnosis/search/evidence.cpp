@@ -144,13 +144,19 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
 std::vector<double> Evidence::rounding_reckoned() const {
   std::vector<double> all = chi2_of_rounding_;
   all.resize(noise_.channels.size(), 0.0);
-  for (std::size_t c = 0; c < all.size(); ++c) {
-    const ComparedChannel& channel = replica_.channels()[c];
-    const double step = record_.find(channel.kind, channel.axis)->resolution;
-    const double of_step = step * step / 12 / (noise_.channels[c].rms * noise_.channels[c].rms);
-    all[c] += count(c, Role::held_out) * std::min(1.0, of_step);
-  }
+  for (std::size_t c = 0; c < all.size(); ++c)
+    all[c] += count(c, Role::held_out) * share_of_steps(c);
   return all;
+}
+
+double Evidence::share_of_steps(std::size_t channel) const {
+  const double step = step_of(channel), noise = noise_.channels[channel].rms;
+  return std::min(1.0, step * step / 12 / (noise * noise));
+}
+
+double Evidence::step_of(std::size_t channel) const {
+  const ComparedChannel& of = replica_.channels()[channel];
+  return record_.find(of.kind, of.axis)->resolution;
 }
 
 void Evidence::take_noise_from(const Machine& machine) {

@@ -135,6 +135,10 @@ class Evidence {
   std::vector<double> rounding_beyond_reckoned(const Machine& machine) const;
   /// The same of what is reckoned with, and what the steps of the signals as recorded make.
   std::vector<double> rounding_reckoned() const;
+  /// Of the variance of a channel's noise: what the steps of the signal as recorded make, 0 .. 1.
+  double share_of_steps(std::size_t channel) const;
+  /// The step of the signal as recorded [m, rad, N, N m]; 0: none is known.
+  double step_of(std::size_t channel) const;
   /// RMS of y - yhat in SI over the samples that count.
   double rms(const Prediction& prediction, std::size_t channel, Role role) const;
 

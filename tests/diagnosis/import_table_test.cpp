@@ -393,6 +393,22 @@ TEST_F(RecordFile, AChangedOrForeignFileIsRefused) {
   }
 }
 
+TEST(ImportTable, RefusesAPositionThatStaysWhileItsCommandMoves) {
+  MeasuredTable table = table_of(columns());
+  for (MeasuredColumn& c : table.columns)
+    if (c.name == "pos") std::fill(c.value.begin(), c.value.end(), 0.01);
+  try {
+    imported(kTime + signal("cmd", "command", "X", "m") + signal("pos", "position", "X", "m") +
+                 signal("force", "force", "X", "N"),
+             table);
+    FAIL();
+  } catch (const MeasurementError& e) {
+    EXPECT_NE(std::string(e.what()).find("\"pos\" (position X) stays where it is while \"cmd\""),
+              std::string::npos)
+        << e.what();
+  }
+}
+
 TEST(ImportTable, KnownForcesMayBeConstantAndNeedACommand) {
   auto all = columns();
   all["push"] = [](double t) { return t > 1 ? 40.0 : 0.0; };

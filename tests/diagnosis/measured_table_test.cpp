@@ -62,6 +62,8 @@ TEST(MeasuredTable, RefusesWithLineAndReason) {
             std::string::npos);
   EXPECT_NE(refusal("t,q\n0,1\n2\n").find("run.csv:3: 1 values, expected 2"), std::string::npos);
   EXPECT_NE(refusal("t,q\n0,\"1\n").find("run.csv:2: a quote is not closed"), std::string::npos);
+  EXPECT_NE(refusal("t,q\r0,1\r").find("run.csv:1: lines end with a carriage return alone"),
+            std::string::npos);
   EXPECT_NE(refusal("t,q\n").find("holds no numbers"), std::string::npos);
   EXPECT_NE(refusal("").find("holds no numbers"), std::string::npos);
 }

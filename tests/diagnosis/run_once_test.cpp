@@ -4,6 +4,7 @@
 
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
+#include "diagnosis/report/diagnosis_text.hpp"
 #include "diagnosis/search/candidate.hpp"
 #include "diagnosis/search/freed_number.hpp"
 #include "healthy_run.hpp"
@@ -60,6 +61,25 @@ INSTANTIATE_TEST_SUITE_P(
                     RunOnce{"gain", circles_in_a_ring, 2, "X.velocity_ff_error",
                             "effects.X.velocity_ff_error.deviation_percent", -2}),
     [](const auto& run) { return run.param.name; });
+
+/// Rounding repeats with the laps: a force that hardly changes is off by most of half a step all
+/// the time, which is more than an even spread makes.
+TEST(CoarselyRecordedRun, IsNoDeviation) {
+  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
+  const double step = 10;  // [N]
+  RunOfMachine run = reversals_in_the_air({});
+  for (MeasuredSignal& s : run.record.signals) {
+    if (s.kind != SignalKind::force) continue;
+    s.resolution = step;
+    for (double& v : s.value) v = step * std::round(v / step);
+  }
+  MachineReplica replica(run.record, run.declared, run.piece);
+  const Diagnosis d = diagnose({run.record, replica, run.declared, candidates(run.declared)});
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::no_deviation) << to_text(d);
+  EXPECT_TRUE(std::any_of(d.notes.begin(), d.notes.end(), [](const std::string& note) {
+    return note.find("force X is recorded in steps of") != std::string::npos;
+  }));
+}
 
 }  // namespace
 }  // namespace vcnc

@@ -149,6 +149,22 @@ TEST_F(DiagnoseCli, RunsAreComparedLessTheHealthyOneOfTheirProgram) {
                  "--compare-only: compares two models and writes nothing");
   expect_refused("diagnose " + sicker + " --suspect X.coulomb --test " + (scratch_ / "nowhere"),
                  "nowhere: no such file");
+  const std::string head = std::string(VCNC_SOURCE_DIR) + "/configs/machines/head.toml";
+  expect_refused("diagnose " + sicker + " --model " + head, "on a machine of another type");
+  write_text(scratch_ / "rest.ngc", "G21 G90 G94\nG4 P1\nM30\n");
+  const auto resting = [&](const std::string& name, const std::string& on) {
+    const std::string out = scratch_ / name;
+    EXPECT_EQ(vcnc("run " + (scratch_ / "rest.ngc") + " --machine " + on +
+                   " --in-process --no-report --out " + out)
+                  .code,
+              0);
+    return out;
+  };
+  expect_refused("diagnose " + sicker + " --test " + resting("headed", head),
+                 "on a machine of other kinematics");
+  expect_refused("commission " + resting("rest", machine) + " --out " + (scratch_ / "learnt.toml"),
+                 "no axis moves");
+  EXPECT_FALSE(fs::exists(scratch_ / "learnt.toml"));
   // Nothing of the user's is lost where a machine is written.
   const std::string recording = sicker + "/recording.h5", before = read_text(recording);
   expect_refused("commission " + sicker + " --model " + machine + " --out " + recording,
