@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -476,21 +477,26 @@ class Report {
       e.minor = e.contour_error_um < 0.02 * largest && e.contour_error_um < 0.5;
   }
 
-  /// Signals whose recorded steps may make what is left of them; empty unless that is all that is
-  /// left. Half a step, the most that rounding is off, has three times the variance of an even
-  /// spread.
-  std::vector<std::size_t> rounded_away() const {
+  /// Chi-square beyond the noise that recorded steps may make of every signal.
+  std::vector<double> made_by_steps() const {
     const Column& residual = selection_.base.residual;
     const std::vector<double> left = evidence_.chi2_of(residual, Role::held_out),
                               floor = noise_floor(evidence_, residual, options_.form_of_channel);
-    std::vector<std::size_t> channels;
-    for (std::size_t c = 0; c < left.size(); ++c) {
-      const double excess = left[c] - floor[c];
-      if (excess <= kFloorScatter * floor[c]) continue;
-      if (excess > 2 * evidence_.share_of_steps(c) * evidence_.count(c, Role::held_out)) return {};
-      channels.push_back(c);
+    std::vector<double> made = evidence_.made_by_steps(selection_.base.prediction);
+    for (std::size_t c = 0; c < made.size(); ++c) made[c] = std::min(made[c], left[c] - floor[c]);
+    return made;
+  }
+
+  void tell_steps(const std::vector<double>& made) {
+    for (std::size_t c = 0; c < made.size(); ++c) {
+      if (made[c] <= kFloorScatter * evidence_.count(c, Role::held_out)) continue;
+      const ComparedChannel& channel = evidence_.replica().channels()[c];
+      const ShownUnit unit = shown_unit(channel);
+      d_.notes.push_back(
+          fmt::format("{} is recorded in steps of {:.3g} {}; what is left of it is no more than "
+                      "those can make.",
+                      channel_name(channel), evidence_.step_of(c) * unit.factor, unit.name));
     }
-    return channels;
   }
 
   /// Whether an axis that vibrates by itself moves a signal.
@@ -519,8 +525,8 @@ class Report {
       const auto beyond = [&](double rms) {
         return std::sqrt(std::max(0.0, rms * rms - noise * noise));
       };
-      if (std::min(is, fitted[c]) < kLoud * noise || beyond(is) < kWrongOfFound * beyond(was))
-        continue;
+      const double loud = std::max(kLoud * noise, 0.5 * evidence_.step_of(c));
+      if (std::min(is, fitted[c]) < loud || beyond(is) < kWrongOfFound * beyond(was)) continue;
       still_off_ = true;
       const ComparedChannel& channel = evidence_.replica().channels()[c];
       const ShownUnit unit = shown_unit(channel);
@@ -547,7 +553,7 @@ class Report {
     if (!quiet)
       law = best_law(evidence_, found(),
                      believed ? doubt_of(options_, found().explained(), base, now, found().rounding)
-                              : doubt_of(options_),
+                              : doubt_of(options_, found().rounding),
                      options_);
     // A law that does better than all that was named takes the names away; it can explain all that
     // there is at most.
@@ -555,7 +561,8 @@ class Report {
     if (anything && takes_names_away(named + left, found().added.size(), named, needed)) {
       LawFit instead = selection_.law_alone
                            ? *selection_.law_alone
-                           : best_law(evidence_, selection_.base, doubt_of(options_), options_);
+                           : best_law(evidence_, selection_.base,
+                                      doubt_of(options_, selection_.base.rounding), options_);
       if (instead.gain > 0.5 * (named + std::max(0.0, law.gain)) &&
           takes_names_away(instead.gain, found().added.size(), named, needed)) {
         std::string names;
@@ -645,16 +652,11 @@ class Report {
     // A piece that lies elsewhere is no fault of the machine.
     const bool named = std::any_of(d_.effects.begin(), d_.effects.end(), is_of_machine);
     double ratio = 1 + after / std::max(1.0, floor_);
-    if (ratio >= kQuiet && !named && !still_off_ && !d_.law && d_.vibrations.empty())
-      for (const std::size_t c : rounded_away()) {
-        const ComparedChannel& channel = evidence_.replica().channels()[c];
-        const ShownUnit unit = shown_unit(channel);
-        d_.notes.push_back(
-            fmt::format("{} is recorded in steps of {:.3g} {}; what is left of it is no more than "
-                        "those can make.",
-                        channel_name(channel), evidence_.step_of(c) * unit.factor, unit.name));
-        ratio = 1;
-      }
+    if (ratio >= kQuiet && !named && !still_off_ && !d_.law && d_.vibrations.empty()) {
+      const std::vector<double> made = made_by_steps();
+      const double beyond = after - std::accumulate(made.begin(), made.end(), 0.0);
+      if (beyond < (kQuiet - 1) * floor_) ratio = 1, tell_steps(made);
+    }
     d_.chi2 = {before + floor_, after + floor_, floor_};
     d_.explained_share = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
     d_.left = ratio < kQuiet ? 0 : std::sqrt(ratio);

@@ -87,7 +87,7 @@ Contest::Contest(const ContestRules& rules, const FittedMachine& now)
       now_(now),
       linear_(now.linear()),
       ground_(rules.evidence, now.residual, linear_),
-      doubt_(now.found() == 0 ? doubt_of(rules.options)
+      doubt_(now.found() == 0 ? doubt_of(rules.options, now.rounding)
                               : doubt_of(rules.options, now.explained(), rules.base_of,
                                          ground_.held_out_of, now.rounding)) {}
 

@@ -20,22 +20,22 @@ double wrong_by(double believed, const Explained& explained, const std::vector<d
 
 }  // namespace
 
-Doubt doubt_of(const DiagnosisOptions& options) {
+Doubt doubt_of(const DiagnosisOptions& options, const std::vector<double>& rounding) {
   Doubt doubt = options.form_of_channel;
   for (double& d : doubt) d *= options.taken_of_form;
-  const std::vector<double>& rounding = options.rounding_of_channel;
-  doubt.resize(std::max(doubt.size(), rounding.size()), 0.0);
-  for (std::size_t c = 0; c < rounding.size(); ++c)
-    doubt[c] += options.taken_of_rounding * rounding[c];
+  const std::vector<double>& reckoned = options.rounding_of_channel;
+  doubt.resize(std::max({doubt.size(), reckoned.size(), rounding.size()}), 0.0);
+  for (std::size_t c = 0; c < reckoned.size(); ++c)
+    doubt[c] += options.taken_of_rounding * reckoned[c];
+  for (std::size_t c = 0; c < rounding.size(); ++c) doubt[c] += rounding[c];
   return doubt;
 }
 
 Doubt doubt_of(const DiagnosisOptions& options, const std::vector<Explained>& found,
                const std::vector<double>& before, const std::vector<double>& left,
                const std::vector<double>& rounding) {
-  Doubt doubt = doubt_of(options);
+  Doubt doubt = doubt_of(options, rounding);
   doubt.resize(left.size(), 0.0);
-  for (std::size_t c = 0; c < rounding.size(); ++c) doubt[c] += rounding[c];
   for (const Explained& explained : found) {
     const double wrong = wrong_by(options.share_of_found, explained, left);
     for (std::size_t c = 0; c < left.size(); ++c) doubt[c] += wrong * std::max(0.0, explained[c]);

@@ -23,12 +23,13 @@ using Explained = std::vector<double>;
 
 /// Where `left` is what is left now and `before` was there before anything was explained, each of
 /// the found effects its part of it. `rounding` is what encoders make of the found effects (play
-/// lets an axis tremble within a step of them) beyond what counts as noise; empty: nothing.
+/// lets an axis tremble within a step of them) beyond what counts as noise, and what the steps of
+/// recorded signals may make; empty: nothing.
 Doubt doubt_of(const DiagnosisOptions& options, const std::vector<Explained>& found,
                const std::vector<double>& before, const std::vector<double>& left,
                const std::vector<double>& rounding = {});
 /// Where nothing was explained yet.
-Doubt doubt_of(const DiagnosisOptions& options);
+Doubt doubt_of(const DiagnosisOptions& options, const std::vector<double>& rounding = {});
 
 /// Of `gain`, which came from `before` going down to `after` in the channels.
 double counted(double gain, const std::vector<double>& before, const std::vector<double>& after,

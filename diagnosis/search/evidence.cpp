@@ -14,6 +14,10 @@ namespace {
 constexpr double kShift = 10e-6;  // of a piece, to see what one does [m]
 /// Times what encoders were reckoned to make of a reading that they may make of it.
 constexpr double kUnderrated = 2;
+/// Share of the variance of a noise from which on steps are most of it; steps that rounding is off
+/// at most (half a one, a little more where what was rounded is rounded again); how much more
+/// chi-square half a step makes than an even spread; and per sample, what beyond that is no chance.
+constexpr double kMostlySteps = 0.5, kHalfAStep = 0.6, kMostOfSteps = 3, kSeenBeyondSteps = 0.005;
 /// Part of the noise that there is at most where there is clearly less; times white noise that is
 /// left where it is clearly not white.
 constexpr double kQuieter = 0.8, kColoured = 1.1;
@@ -152,6 +156,28 @@ std::vector<double> Evidence::rounding_reckoned() const {
 double Evidence::share_of_steps(std::size_t channel) const {
   const double step = step_of(channel), noise = noise_.channels[channel].rms;
   return std::min(1.0, step * step / 12 / (noise * noise));
+}
+
+std::vector<double> Evidence::made_by_steps(const Prediction& prediction) const {
+  std::vector<double> all(measured_.size(), 0.0);
+  for (std::size_t c = 0; c < all.size(); ++c)
+    if (is_within_steps(prediction, c))
+      all[c] = kMostOfSteps * count(c, Role::held_out) * share_of_steps(c);
+  return all;
+}
+
+bool Evidence::is_within_steps(const Prediction& prediction, std::size_t channel) const {
+  const double step = step_of(channel), noise = noise_.channels[channel].rms;
+  if (share_of_steps(channel) < kMostlySteps) return false;
+  const double other = std::sqrt(std::max(0.0, noise * noise - step * step / 12)),
+               rounded = (noise_scale_ > 1 ? 2 : 1) * kHalfAStep * step,  // a difference: twice
+      most = rounded + 3 * other;
+  double beyond = 0;
+  for (std::size_t k = 0; k < measured_[channel].size(); ++k) {
+    const double off = std::abs(measured_[channel][k] - prediction[channel][k]);
+    if (raw_valid_[channel][k] && off > most) beyond += (off - most) * (off - most);
+  }
+  return beyond < noise * noise * kSeenBeyondSteps * count(channel, Role::both);
 }
 
 double Evidence::step_of(std::size_t channel) const {

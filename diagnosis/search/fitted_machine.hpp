@@ -41,7 +41,7 @@ struct FittedMachine {
   Column residual;
   std::vector<Column> columns;  ///< of all numbers of `added`, in order
   double held_out = std::numeric_limits<double>::infinity();
-  std::vector<double> rounding;  ///< see Evidence::rounding_beyond_reckoned()
+  std::vector<double> rounding;  ///< held-out chi-square per channel; see doubt_of()
 
   std::vector<FreedNumber> numbers() const;  ///< of all added effects
   std::size_t found() const { return added.size() + released.size(); }

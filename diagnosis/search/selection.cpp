@@ -47,6 +47,7 @@ class Search {
     rules_.floor = result_.floor =
         std::accumulate(rules_.floor_of.begin(), rules_.floor_of.end(), 0.0);
     rules_.base_of = evidence_.chi2_of(result_.base.residual, Role::held_out);
+    result_.base.rounding = evidence_.made_by_steps(result_.base.prediction);
     simulate();
     result_.found = result_.base;
     if (going_) {
@@ -84,10 +85,10 @@ class Search {
     evidence_.anchor(now.machine);
     if (!accept_one(now, contenders, first)) return now;
     while (going_) {
-      now.rounding = evidence_.rounding_beyond_reckoned(now.machine);
+      now.rounding = rounding_of(now);
       look_again(now);
       exchange(now);
-      now.rounding = evidence_.rounding_beyond_reckoned(now.machine);
+      now.rounding = rounding_of(now);
       ladder.push_back(step_of(now, ladder.size()));
       if (now.found() >= options_.max_effects) break;
       if (imitates(now)) break;
@@ -101,6 +102,14 @@ class Search {
     return now;
   }
 
+  /// What encoders make beyond what is reckoned with, and what recorded steps may make.
+  std::vector<double> rounding_of(const FittedMachine& now) const {
+    std::vector<double> all = evidence_.made_by_steps(now.prediction);
+    const std::vector<double> encoders = evidence_.rounding_beyond_reckoned(now.machine);
+    for (std::size_t c = 0; c < encoders.size(); ++c) all[c] += encoders[c];
+    return all;
+  }
+
   /// Whether one law without a name does what the names so far do not.
   bool imitates(const FittedMachine& now) {
     const double all = rules_.excess(result_.base.held_out);
@@ -108,7 +117,8 @@ class Search {
         rules_.excess(now.held_out) < kMostLeft * all)
       return false;
     if (!result_.law_alone && go("looking for a law without a name", 0))
-      result_.law_alone = best_law(evidence_, result_.base, doubt_of(options_), options_);
+      result_.law_alone =
+          best_law(evidence_, result_.base, doubt_of(options_, result_.base.rounding), options_);
     if (!result_.law_alone) return false;
     const double gain = result_.law_alone->gain, named = result_.base.held_out - now.held_out;
     const bool many = now.added.size() >= kImitation;
@@ -202,7 +212,7 @@ class Search {
 
   /// What the first effect must reach.
   Needed needed() const {
-    Needed n{options_.least_gain, doubt_of(options_), {}};
+    Needed n{options_.least_gain, doubt_of(options_, result_.base.rounding), {}};
     n.consequence = {std::max(options_.least_contour_um, options_.form_um), 0,
                      options_.least_of_noise};
     return n;
