@@ -335,6 +335,30 @@ TEST(FittedMachine, GoesFartherWhereRoughSensitivitiesMakeStepsShort) {
   EXPECT_NEAR(number_of(m.machine, "axes.X.load_kg"), 515, 1);
 }
 
+/// A force of +-10 N is rounded to zero in steps of 40 N, and told by any of its samples; one of
+/// +-70 N is rounded to +-80 N.
+TEST(StepsOfASignal, MakeWhatIsWithinHalfOfOneAndNoMore) {
+  const Machine declared = toy::machine({{"effects.X.coulomb.level_N", 10}});
+  Record record = toy::commands(1000, 4);
+  const auto recorded = [&](const Machine& truth) {
+    const Prediction exact = toy::ToyReplica(record).predict(truth);
+    std::erase_if(record.signals, [](const auto& s) { return s.kind != SignalKind::command; });
+    const std::vector<ComparedChannel> channels = toy::ToyReplica(record).channels();
+    for (std::size_t c = 0; c < channels.size(); ++c)
+      record.signals.push_back({channels[c].kind, channels[c].axis, "", exact[c], 0});
+    MeasuredSignal& force = record.signals[record.signals.size() - 2];
+    force.resolution = 40;
+    for (double& v : force.value) v = 40 * std::round(v / 40);
+    toy::ToyReplica replica(record);
+    return Evidence(record, replica, declared).made_by_steps(replica.predict(declared));
+  };
+  const std::vector<double> alike = recorded(declared);
+  EXPECT_EQ(alike[0], 0);
+  EXPECT_GT(alike[1], 1000);
+  EXPECT_EQ(alike[2], 0);
+  EXPECT_EQ(recorded(toy::machine({{"effects.X.coulomb.level_N", 70}}))[1], 0);
+}
+
 TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {
   DiagnosisOptions options;
   options.share_of_found = 0.01;
@@ -347,6 +371,7 @@ TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {
   options.form_of_channel = {100, 0};
   options.taken_of_form = 0.5;
   EXPECT_EQ(doubt_of(options), (Doubt{50, 0}));
+  EXPECT_EQ(doubt_of(options, {3, 4}), (Doubt{53, 4}));
   const Doubt doubt = doubt_of(options, {{2000, -100}}, {2500, 500}, {500, 600});
   EXPECT_EQ(doubt, (Doubt{70, 100}));
   EXPECT_EQ(doubt_of(options, {{2000, -100}}, {2500, 500}, {500, 600}, {3, 4}), (Doubt{73, 104}));
