@@ -83,7 +83,8 @@ std::string effect_box(const FoundEffect& e) {
     for (const std::string& c : e.class_with) others += (others.empty() ? "" : ", ") + escaped(c);
     text += "<p>This run cannot tell it from: " + others + ".";
     if (!e.separating_program.empty())
-      text += " <code>vcnc program " + escaped(e.separating_program) + "</code> would.";
+      text += " <code>vcnc program " + escaped(e.separating_program) +
+              "</code>, at another feed or size if this is one, may.";
     text += "</p>\n";
   }
   return text + "</div>\n";

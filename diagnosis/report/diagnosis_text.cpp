@@ -110,11 +110,12 @@ std::string to_text(const Diagnosis& d) {
     if (!e.class_with.empty()) {
       std::string others;
       for (const std::string& c : e.class_with) others += (others.empty() ? "" : ", ") + c;
-      text += fmt::format(
-          "    or: {}{}\n", others,
-          e.separating_program.empty()
-              ? ""
-              : "; a run of `vcnc program " + e.separating_program + "` would tell them apart");
+      text +=
+          fmt::format("    or: {}{}\n", others,
+                      e.separating_program.empty()
+                          ? ""
+                          : "; a run of `vcnc program " + e.separating_program +
+                                "`, at another feed or size if this is one, may tell them apart");
     }
   }
   if (d.law && d.verdict != DiagnosisVerdict::unexplained) text += "  " + d.law->words + "\n";
