@@ -44,7 +44,7 @@ int commission_command(const CommissionOptions& options) {
   progress.clear();
   if (c.numbers.empty() && !stop_requested())
     throw InputError(record.source +
-                     ": nothing moves in it that says anything of the declared machine; nothing is "
+                     ": tells nothing of the declared machine that could be fitted; nothing is "
                      "written");
   for (const std::string& note : c.notes) std::cout << note << '\n';
   for (const FittedNumber& n : c.numbers)

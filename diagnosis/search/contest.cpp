@@ -390,7 +390,11 @@ double Contest::needed_of(const std::vector<std::size_t>& together,
 }
 
 double Contest::counts(double gain, const std::vector<double>& after) const {
-  return counted(gain, ground_.held_out_of, after, doubt_);
+  // A tolerance that is not strained any more is no gain where none of the samples' counts.
+  double of_samples = 0;
+  for (std::size_t c = 0; c < after.size(); ++c) of_samples += ground_.held_out_of[c] - after[c];
+  const double count = counted(of_samples, ground_.held_out_of, after, doubt_);
+  return count <= 0 ? count : counted(gain, ground_.held_out_of, after, doubt_);
 }
 
 /// Held-out gain per condition: an effect that shows under several must help under two.

@@ -138,8 +138,6 @@ class Evidence {
   /// Held-out chi-square of every channel that the steps of its signal may make at most, where
   /// nothing but they can be told from a prediction: every sample is within half a step of it.
   std::vector<double> made_by_steps(const Prediction& prediction) const;
-  /// Of the variance of a channel's noise: what the steps of the signal as recorded make, 0 .. 1.
-  double share_of_steps(std::size_t channel) const;
   /// The step of the signal as recorded [m, rad, N, N m]; 0: none is known.
   double step_of(std::size_t channel) const;
   /// RMS of y - yhat in SI over the samples that count.
@@ -164,6 +162,8 @@ class Evidence {
   std::vector<float> whiten(std::size_t channel, const std::vector<double>& series) const;
   /// Of what can be compared of a channel.
   double rms_of(const std::vector<double>& series, std::size_t channel, Role role) const;
+  /// Of the variance of a channel's noise: what the steps of the signal as recorded make, 0 .. 1.
+  double share_of_steps(std::size_t channel) const;
   bool is_within_steps(const Prediction& prediction, std::size_t channel) const;
   bool keep_comparable(std::size_t channel, std::vector<double>& change) const;
   /// What these machines make of the readings of the probe, of what each is shifted by [m]; empty

@@ -36,6 +36,23 @@ TEST(Diagnose, SaysNoDeviationOfAHealthyMachine) {
   EXPECT_FALSE(d.law);
 }
 
+/// 15 N of dry friction are rounded to nothing in steps of 40 N, in every lap: friction that is
+/// less, if half a step were evidence.
+TEST(Diagnose, WhatStepsOfASignalHideIsNoDeviation) {
+  const Machine declared = toy::machine({{"axes.X.load_kg", 1}, {"effects.X.coulomb.level_N", 15}});
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, declared, 1);
+  MeasuredSignal& force = record.signals[record.signals.size() - 2];
+  ASSERT_EQ(force.kind, SignalKind::force);
+  force.resolution = 40;
+  const Prediction exact = toy::ToyReplica(record).predict(declared);
+  for (std::size_t k = 0; k < force.value.size(); ++k)
+    force.value[k] = 40 * std::round(exact[1][k] / 40);
+  const Diagnosis d = diagnosed(record, declared);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::no_deviation) << to_text(d);
+  EXPECT_TRUE(d.effects.empty());
+}
+
 TEST(Diagnose, ExplainsWithIntervalAndFigures) {
   const Machine truth = toy::machine({{"effects.X.load_play.width_um", 2}});
   const Diagnosis d = diagnosed(measured(truth, 2));
