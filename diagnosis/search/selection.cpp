@@ -23,6 +23,7 @@ constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to loo
 constexpr std::size_t kImitation = 3;  ///< names that are too many where one law does better
 constexpr double kHalf = 0.5;  ///< of what is left: for a further effect than few, or another one
 constexpr double kClearlySimpler = 0.5;  ///< numbers
+constexpr double kPartInALine = 0.25;  ///< of the least gain: less, and a wave is not worth a trial
 constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
 
 Explained minus(Explained x, const std::vector<double>& y) {
@@ -81,7 +82,8 @@ class Search {
   FittedMachine climbed(const std::vector<Contender>& contenders, const Contest& first,
                         std::vector<LadderStep>& ladder) {
     FittedMachine now = result_.base;
-    result_.trials = at_base_;
+    result_.trials = known_ = at_base_;
+    values_.erase(values_.begin() + 1, values_.end());
     evidence_.anchor(now.machine);
     if (!accept_one(now, contenders, first)) return now;
     while (going_) {
@@ -218,11 +220,9 @@ class Search {
     return n;
   }
 
-  void simulate() {
-    if (!going_) return;
-    std::vector<Trial> all = trials(result_.base.machine, candidates_,
-                                    TrialValuesOf(evidence_, declared_, result_.base.residual));
-    // What goes along in every fit is no news: see releases().
+  /// Trials with these values. What goes along in every fit is no news: see releases().
+  std::vector<Trial> worth_trying(const TrialValuesOf& values) const {
+    std::vector<Trial> all = trials(result_.base.machine, candidates_, values);
     std::erase_if(all, [&](const Trial& t) {
       const std::vector<FreeNumber>& numbers = candidates_[t.candidate].numbers;
       const bool goes_along = std::all_of(numbers.begin(), numbers.end(), [&](const FreeNumber& n) {
@@ -230,6 +230,15 @@ class Search {
       });
       return goes_along || asleep(candidates_[t.candidate]);
     });
+    return all;
+  }
+
+  double worth_of_line() const { return kPartInALine * options_.least_gain; }
+
+  void simulate() {
+    if (!going_) return;
+    values_.emplace_back(evidence_, declared_, result_.base.residual, worth_of_line());
+    const std::vector<Trial> all = worth_trying(values_.front());
     const std::string doing = "simulating " + std::to_string(candidates_.size()) + " candidates";
     result_.trials = simulate_trials(evidence_, result_.base.machine, result_.base.prediction,
                                      candidates_, all, [&](double s) { return go(doing, s); });
@@ -244,29 +253,56 @@ class Search {
   }
 
   /// What an effect of a drive does depends on the others that it has (play rattles where nothing
-  /// rubs): of axes at whose drive something was found, trials are simulated anew with that.
+  /// rubs): of axes at whose drive something was found, trials are simulated anew with that. And a
+  /// large effect hides the waves of a small one: shapes that only show now are tried as well.
   void look_again(const FittedMachine& now) {
-    result_.trials = at_base_;
+    try_shapes_that_show(now);
+    result_.trials = known_;
     const std::set<std::string> drives = drives_found(now, candidates_);
-    std::set<std::size_t> known;
-    for (const AddedEffect& a : now.added) known.insert(a.candidate);
+    std::set<std::size_t> found;
+    for (const AddedEffect& a : now.added) found.insert(a.candidate);
     std::vector<std::size_t> which;
     std::vector<Trial> again;
-    for (std::size_t t = 0; t < result_.trials.size(); ++t) {
-      const Trial& trial = result_.trials[t].trial;
+    for (std::size_t t = 0; t < known_.size(); ++t) {
+      const Trial& trial = known_[t].trial;
       const Candidate& c = candidates_[trial.candidate];
-      if (!is_of_drive(c) || !drives.contains(c.place) || known.contains(trial.candidate)) continue;
+      if (!is_of_drive(c) || !drives.contains(c.place) || found.contains(trial.candidate)) continue;
       which.push_back(t);
       again.push_back(trial);
     }
-    if (again.empty()) return;
     std::vector<TrialColumns> anew =
-        simulate_trials(evidence_, now.machine, now.prediction, candidates_, std::move(again),
-                        [&](double s) { return go("simulating drives anew", s); });
+        simulated_with(now, std::move(again), "simulating drives anew");
     for (std::size_t i = 0; i < which.size(); ++i) {
       anew[i].detection_limit = result_.trials[which[i]].detection_limit;
       result_.trials[which[i]] = std::move(anew[i]);
     }
+  }
+
+  /// Adds trials with shapes that no residual showed before, and with those that were found.
+  void try_shapes_that_show(const FittedMachine& now) {
+    if (rules_.excess(now.held_out) > options_.least_gain) {
+      TrialValuesOf values(evidence_, declared_, now.residual, worth_of_line());
+      for (const TrialValuesOf& known : values_) values.follow(known);
+      values_.push_back(std::move(values));
+    }
+    for (const AddedEffect& a : now.added)
+      values_.back().add_found(candidates_[a.candidate], a.numbers);
+    std::vector<Trial> fresh = worth_trying(values_.back());
+    std::erase_if(fresh, [&](const Trial& trial) {
+      return std::any_of(known_.begin(), known_.end(), [&](const TrialColumns& k) {
+        return k.trial.candidate == trial.candidate && k.trial.values == trial.values;
+      });
+    });
+    std::vector<TrialColumns> columns =
+        simulated_with(now, std::move(fresh), "simulating shapes that show now");
+    std::move(columns.begin(), columns.end(), std::back_inserter(known_));
+  }
+
+  std::vector<TrialColumns> simulated_with(const FittedMachine& m, std::vector<Trial> which,
+                                           const std::string& doing) {
+    if (which.empty()) return {};
+    return simulate_trials(evidence_, m.machine, m.prediction, candidates_, std::move(which),
+                           [&](double s) { return go(doing, s); });
   }
 
   /// A drive whose axis never moves shows nothing of its servo, friction or mechanics; of one that
@@ -512,7 +548,9 @@ class Search {
   const DiagnosisOptions& options_;
   const KeepGoing& keep_going_;
   SelectionResult result_;
-  std::vector<TrialColumns> at_base_;       ///< the trials of the base machine
+  std::vector<TrialColumns> at_base_;  ///< the trials of the base machine
+  std::vector<TrialColumns> known_;    ///< and those with shapes that showed later in this climb
+  std::vector<TrialValuesOf> values_;  ///< what at_base_ and then known_ were made with
   std::vector<FittedMachine> also_fitted_;  ///< with a contender that the last one was chosen over
   ContestRules rules_{
       evidence_, candidates_,

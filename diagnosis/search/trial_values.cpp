@@ -32,89 +32,165 @@ double si_of_unit(const std::string& key) {
   return 1;
 }
 
+/// Over the position of an axis, where its key has a unit of that.
+bool is_wavelength(const FreeNumber& n) {
+  return contains(n.key, ".period_") || contains(n.key, "pitch_") ||
+         contains(n.key, ".wavelength_");
+}
+
+/// Waves per travel: half a bin apart, up to where a wave is 1/200 of the travel; and about a line.
+constexpr WaveGrid kWaves{.first = 1.5, .apart = 0.5, .count = 397};
+constexpr WaveGrid kAboutLine{.first = -0.4, .apart = 0.1, .count = 9};
+constexpr double kMostSamples = 20000;    ///< of a spectrum
+constexpr double kSameWaves = 0.75;       ///< per travel: no other line
+constexpr double kSameWavesFound = 0.05;  ///< where they were fitted
+constexpr double kSameFrequency = 1.5;    ///< [Hz]
+constexpr double kSameInstant = 0.1;      ///< [s]
+constexpr std::size_t kStrongest = 3;     ///< lines of an axis
+
+/// The values of `found` in turn, one that `same` takes for one of `known` as it is there.
+template <class Same>
+void follow_values(std::vector<double>& found, const std::vector<double>& known, Same&& same) {
+  for (double& value : found)
+    for (const double k : known)
+      if (same(value, k)) value = k;
+}
+
 }  // namespace
 
-double line_power(const std::vector<double>& position, const std::vector<double>& z, double w) {
-  double ss = 0, cc = 0, sc = 0, zs = 0, zc = 0;
-  for (std::size_t k = 0; k < z.size(); ++k) {
-    const double angle = 2 * kPi / w * position[k];
-    const double s = std::sin(angle), c = std::cos(angle);
-    ss += s * s, cc += c * c, sc += s * c, zs += z[k] * s, zc += z[k] * c;
+Eigen::ArrayXXd line_powers(const Eigen::ArrayXd& position, const Eigen::ArrayXXd& z, double length,
+                            const WaveGrid& grid) {
+  Eigen::ArrayXXd power = Eigen::ArrayXXd::Zero(grid.count, z.cols());
+  const Eigen::ArrayXd first = 2 * kPi * grid.first / length * position,
+                       turn = 2 * kPi * grid.apart / length * position;
+  Eigen::ArrayXd s = first.sin(), c = first.cos(), was(position.size());
+  const Eigen::ArrayXd turn_s = turn.sin(), turn_c = turn.cos();
+  for (Eigen::Index row = 0; row < grid.count; ++row) {
+    const double ss = s.square().sum(), cc = c.square().sum(), sc = (s * c).sum();
+    const double det = ss * cc - sc * sc;
+    if (det > 1e-9 * ss * cc)
+      for (Eigen::Index i = 0; i < z.cols(); ++i) {
+        const double zs = (z.col(i) * s).sum(), zc = (z.col(i) * c).sum();
+        power(row, i) = (zs * zs * cc - 2 * zs * zc * sc + zc * zc * ss) / det;
+      }
+    was = s;
+    s = s * turn_c + c * turn_s;
+    c = c * turn_c - was * turn_s;
   }
-  const double det = ss * cc - sc * sc;
-  if (det <= 1e-9 * ss * cc) return 0;
-  return (zs * zs * cc - 2 * zs * zc * sc + zc * zc * ss) / det;
+  return power;
 }
 
 TrialValuesOf::TrialValuesOf(const Evidence& evidence, const Machine& machine,
-                             const Column& residual)
-    : evidence_(evidence),
+                             const Column& residual, double least_gain)
+    : evidence_(&evidence),
       duration_(static_cast<double>(evidence.record().samples()) * evidence.record().period),
+      travel_(kAxisCount, 0.0),
       wavelengths_(kAxisCount),
       jump_(find_jump(residual)),
       ringing_(find_ringing(residual)) {
   for (const AxisParams& axis : machine.axes)
     travel_per_turn_.push_back(axis.mechanics.travel_per_turn);
-  parallel_for(kAxisCount,
-               [&](std::size_t axis) { wavelengths_[axis] = find_wavelengths(axis, residual); });
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (const MeasuredSignal* command = evidence.record().find(SignalKind::command, axis)) {
+      const auto [low, high] = std::minmax_element(command->value.begin(), command->value.end());
+      travel_[axis] = *high - *low;
+    }
+  parallel_for(kAxisCount, [&](std::size_t axis) {
+    wavelengths_[axis] = find_wavelengths(axis, residual, least_gain);
+  });
 }
 
-std::vector<double> TrialValuesOf::find_wavelengths(std::size_t axis,
-                                                    const Column& residual) const {
-  const Record& record = evidence_.record();
+void TrialValuesOf::follow(const TrialValuesOf& known) {
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    follow_values(wavelengths_[axis], known.wavelengths_[axis], [&](double w, double k) {
+      return std::abs(travel_[axis] / w - travel_[axis] / k) < kSameWaves;
+    });
+  follow_values(ringing_, known.ringing_,
+                [](double f, double k) { return std::abs(f - k) < kSameFrequency; });
+  if (std::abs(jump_ - known.jump_) < kSameInstant) jump_ = known.jump_;
+}
+
+void TrialValuesOf::add_found(const Candidate& candidate, const std::vector<FreedNumber>& numbers) {
+  const std::size_t axis = axis_of(candidate);
+  if (axis == kAxisCount) return;
+  for (const FreedNumber& n : numbers) {
+    if (!n.shape || !is_wavelength(n.number)) continue;
+    const double found = n.value * si_of_unit(n.number.key);
+    std::vector<double>& known = wavelengths_[axis];
+    if (std::none_of(known.begin(), known.end(), [&](double w) {
+          return std::abs(travel_[axis] / w - travel_[axis] / found) < kSameWavesFound;
+        }))
+      known.push_back(found);
+  }
+}
+
+std::vector<double> TrialValuesOf::find_wavelengths(std::size_t axis, const Column& residual,
+                                                    double least_gain) const {
+  const Record& record = evidence_->record();
   const MeasuredSignal* command = record.find(SignalKind::command, axis);
-  if (!command) return {};
-  const auto [low, high] = std::minmax_element(command->value.begin(), command->value.end());
-  const double travel = *high - *low;
-  if (!(travel > 0)) return {};
+  const double travel = travel_[axis];
+  if (!command || !(travel > 0)) return {};
+  std::vector<std::size_t> channels;
+  for (std::size_t c = 0; c < residual.size(); ++c) {
+    const ComparedChannel& channel = evidence_->replica().channels()[c];
+    if ((channel.kind == SignalKind::deflection || channel.axis == axis) && !residual[c].empty())
+      channels.push_back(c);
+  }
+  // All samples of the fitted laps, or of a long record some at irregular intervals, so that short
+  // waves are not taken for long ones.
+  std::vector<std::size_t> samples;
+  const double share =
+      std::min(1.0, kMostSamples / static_cast<double>(evidence_->record().samples()));
+  constexpr double kGolden = 0.6180339887498949;
+  for (const Block& block : evidence_->partition().blocks)
+    for (std::size_t k = block.begin; k < block.end && !block.held_out; ++k) {
+      const double turn = kGolden * static_cast<double>(k);
+      if (turn - std::floor(turn) <= share) samples.push_back(k);
+    }
+  const auto count = static_cast<Eigen::Index>(samples.size());
+  Eigen::ArrayXd position(count);
+  Eigen::ArrayXXd z(count, static_cast<Eigen::Index>(channels.size()));
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const std::size_t k = samples[static_cast<std::size_t>(i)];
+    position[i] = command->value[k];
+    for (Eigen::Index c = 0; c < z.cols(); ++c)
+      z(i, c) = static_cast<double>(residual[channels[static_cast<std::size_t>(c)]][k]);
+  }
+  const Eigen::ArrayXXd power = line_powers(position, z, travel, kWaves);
 
   struct Line {
-    double wavelength, power;
+    double waves, power;
+    Eigen::Index channel;
   };
   std::vector<Line> lines;
-  for (std::size_t c = 0; c < residual.size(); ++c) {
-    const ComparedChannel& channel = evidence_.replica().channels()[c];
-    if (channel.kind != SignalKind::deflection && channel.axis != axis) continue;
-    if (residual[c].empty()) continue;
-    std::vector<double> position, z;
-    // About 3000 samples at irregular intervals, so that short waves are not taken for long ones.
-    const double share = 3000 / static_cast<double>(residual[c].size() + 1);
-    constexpr double kGolden = 0.6180339887498949;
-    for (const Block& block : evidence_.partition().blocks) {
-      if (block.held_out) continue;
-      for (std::size_t k = block.begin; k < block.end; ++k) {
-        const double turn = kGolden * static_cast<double>(k);
-        if (turn - std::floor(turn) > share) continue;
-        position.push_back(command->value[k]);
-        z.push_back(static_cast<double>(residual[c][k]));
-      }
-    }
-    // Spatial frequencies half a bin apart, up to where a wave is 1/200 of the travel.
-    std::vector<Line> spectrum;
-    for (double waves = 1.5; waves < 200; waves += 0.5)
-      spectrum.push_back({travel / waves, line_power(position, z, travel / waves)});
-    for (std::size_t i = 1; i + 1 < spectrum.size(); ++i)
-      if (spectrum[i].power >= spectrum[i - 1].power && spectrum[i].power > spectrum[i + 1].power)
-        lines.push_back(spectrum[i]);
-  }
+  for (Eigen::Index c = 0; c < z.cols(); ++c)
+    for (Eigen::Index i = 1; i + 1 < kWaves.count; ++i)
+      if (power(i, c) >= power(i - 1, c) && power(i, c) > power(i + 1, c) &&
+          power(i, c) >= share * least_gain)
+        lines.push_back({kWaves.waves(i), power(i, c), c});
   std::sort(lines.begin(), lines.end(),
             [](const Line& x, const Line& y) { return x.power > y.power; });
   std::vector<double> best;
   for (const Line& line : lines) {
     const bool known = std::any_of(best.begin(), best.end(), [&](double w) {
-      return std::abs(travel / w - travel / line.wavelength) < 0.75;
+      return std::abs(travel / w - line.waves) < kSameWaves;
     });
-    if (!known) best.push_back(line.wavelength);
-    if (best.size() == 3) break;
+    if (known) continue;
+    WaveGrid about = kAboutLine;
+    about.first += line.waves;
+    Eigen::Index highest = 0;
+    line_powers(position, z.col(line.channel), travel, about).col(0).maxCoeff(&highest);
+    best.push_back(travel / about.waves(highest));
+    if (best.size() == kStrongest) break;
   }
   return best;
 }
 
 double TrialValuesOf::largest_reading() const {
   double largest = 0;
-  for (const ComparedChannel& c : evidence_.replica().channels()) {
+  for (const ComparedChannel& c : evidence_->replica().channels()) {
     if (c.kind != SignalKind::deflection) continue;
-    for (const double value : evidence_.record().find(c.kind, c.axis)->value)
+    for (const double value : evidence_->record().find(c.kind, c.axis)->value)
       if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
   }
   return largest;
@@ -124,7 +200,7 @@ double TrialValuesOf::find_jump(const Column& residual) const {
   const std::size_t window = 50;
   double largest = 0, at = 0;
   for (std::size_t c = 0; c < residual.size(); ++c) {
-    if (evidence_.replica().channels()[c].kind != SignalKind::deflection) continue;
+    if (evidence_->replica().channels()[c].kind != SignalKind::deflection) continue;
     const std::vector<float>& z = residual[c];
     double before = 0, after = 0;
     for (std::size_t k = 0; k + window < z.size(); ++k) {
@@ -132,10 +208,10 @@ double TrialValuesOf::find_jump(const Column& residual) const {
       if (k >= window) before += static_cast<double>(z[k]) - static_cast<double>(z[k - window]);
       if (std::abs(after - before) <= largest) continue;
       largest = std::abs(after - before);
-      at = static_cast<double>(k) * evidence_.record().period;
+      at = static_cast<double>(k) * evidence_->record().period;
     }
   }
-  return at + evidence_.record().begin;
+  return at + evidence_->record().begin;
 }
 
 /// Peaks of the periodogram over the median around them; blocks of the fitted laps, Hann's window.
@@ -146,11 +222,11 @@ std::vector<double> TrialValuesOf::find_ringing(const Column& residual) const {
   std::vector<double> power(static_cast<std::size_t>((kHighest - kLowest) / kStep) + 1, 0.0);
   parallel_for(power.size(), [&](std::size_t i) {
     const double w =
-        2 * kPi * (kLowest + kStep * static_cast<double>(i)) * evidence_.record().period;
+        2 * kPi * (kLowest + kStep * static_cast<double>(i)) * evidence_->record().period;
     for (std::size_t c = 0; c < residual.size(); ++c) {
       const std::vector<float>& z = residual[c];
-      if (evidence_.replica().channels()[c].kind != SignalKind::deflection || z.empty()) continue;
-      for (const Block& block : evidence_.partition().blocks) {
+      if (evidence_->replica().channels()[c].kind != SignalKind::deflection || z.empty()) continue;
+      for (const Block& block : evidence_->partition().blocks) {
         if (block.held_out) continue;
         const double window = 2 * kPi / static_cast<double>(block.end - block.begin);
         const std::complex<double> turn = std::polar(1.0, w), slow = std::polar(1.0, window);
@@ -199,7 +275,7 @@ std::vector<double> TrialValuesOf::operator()(const Candidate& candidate,
     const double largest = largest_reading() / si_of_unit(n.key);
     for (const double share : {0.995, 0.97, 0.9, 0.8}) more({share * largest});
   } else if (contains(n.key, "frequency_Hz")) {
-    for (const NoiseLine& line : evidence_.noise().lines) more({line.frequency});
+    for (const NoiseLine& line : evidence_->noise().lines) more({line.frequency});
     more(ringing_);
   } else if (contains(n.key, ".time_constant_s")) {
     values.clear();
@@ -208,11 +284,10 @@ std::vector<double> TrialValuesOf::operator()(const Candidate& candidate,
     values.clear();
     // A quarter of a wave in the run's length apart: further off the phase is lost at its end.
     for (double waves = 0.5; waves <= 5; waves += 0.25) more({duration_ / waves});
-  } else if (axis < kAxisCount && (contains(n.key, ".period_") || contains(n.key, "pitch_") ||
-                                   contains(n.key, ".wavelength_"))) {
+  } else if (axis < kAxisCount && is_wavelength(n)) {
     for (const double w : wavelengths_[axis]) more({w / si_of_unit(n.key)});
   } else if (axis < kAxisCount && contains(n.key, ".centre_")) {
-    const MeasuredSignal* command = evidence_.record().find(SignalKind::command, axis);
+    const MeasuredSignal* command = evidence_->record().find(SignalKind::command, axis);
     if (!command) return values;
     const auto [low, high] = std::minmax_element(command->value.begin(), command->value.end());
     values.clear();

@@ -2,7 +2,8 @@
 //
 //   wavelength of an axis effect   lines of the residual over the axis' position: least squares of
 //                                  sine and cosine at every trial wavelength (Lomb 1976), the
-//                                  strongest three; and the typical one
+//                                  strongest three that are worth it; those of effects that were
+//                                  found; and the typical one
 //   frequency                      lines that do not repeat (noise audit), those of the residual
 //                                  of the readings that stand out most, and the typical one
 //   time constant                  0.1, 0.3, 1 and 3 times the length of the run
@@ -12,6 +13,7 @@
 //   exponent, edge, ...            the typical value, an exponent also above 1
 #pragma once
 
+#include <Eigen/Dense>
 #include <vector>
 
 #include "diagnosis/search/evidence.hpp"
@@ -21,26 +23,46 @@ namespace vcnc {
 
 class TrialValuesOf {
  public:
-  /// `evidence` must outlive this.
-  TrialValuesOf(const Evidence& evidence, const Machine& machine, const Column& residual);
+  /// Lines over an axis' position that explain less than `least_gain` of the chi-square of every
+  /// channel are left out. `evidence` must outlive this.
+  TrialValuesOf(const Evidence& evidence, const Machine& machine, const Column& residual,
+                double least_gain);
 
   std::vector<double> operator()(const Candidate& candidate, std::size_t number) const;
 
+  /// Takes what is as good as the same in `known` from there, so that only what is new differs.
+  void follow(const TrialValuesOf& known);
+
+  /// Adds the wavelength that an effect was found with.
+  void add_found(const Candidate& candidate, const std::vector<FreedNumber>& numbers);
+
  private:
-  std::vector<double> find_wavelengths(std::size_t axis, const Column& residual) const;
+  std::vector<double> find_wavelengths(std::size_t axis, const Column& residual,
+                                       double least_gain) const;
   double find_jump(const Column& residual) const;
   std::vector<double> find_ringing(const Column& residual) const;
   double largest_reading() const;  ///< of the probe [m]
 
-  const Evidence& evidence_;
+  const Evidence* evidence_;
   std::vector<double> travel_per_turn_;  ///< per axis, of its motor [m or rad]
   double duration_ = 0;
+  std::vector<double> travel_;                    ///< per axis, of its command [m or rad]
   std::vector<std::vector<double>> wavelengths_;  ///< per axis [m or rad]
   double jump_ = 0;                               ///< [s]
   std::vector<double> ringing_;                   ///< [Hz]
 };
 
-/// Power that sine and cosine of wavelength w over `position` explain of `z`, in squares of z.
-double line_power(const std::vector<double>& position, const std::vector<double>& z, double w);
+/// Numbers of waves per length: `first`, `first + apart`, ...
+struct WaveGrid {
+  double first = 1, apart = 1;
+  Eigen::Index count = 1;
+
+  double waves(Eigen::Index i) const { return first + apart * static_cast<double>(i); }
+};
+
+/// Power that sine and cosine over `position` explain of each column of `z`, in squares of z: a row
+/// per number of waves in `length`.
+Eigen::ArrayXXd line_powers(const Eigen::ArrayXd& position, const Eigen::ArrayXXd& z, double length,
+                            const WaveGrid& grid);
 
 }  // namespace vcnc

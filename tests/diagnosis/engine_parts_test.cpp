@@ -453,7 +453,8 @@ TEST(TrialValues, FrequenciesAreThoseTheReadingsRingWith) {
                         {"effects.X.structural_mode.frequency_Hz", 35, 1, 500}},
                        {1},
                        Family::mechanics};
-  const TrialValuesOf values(evidence, Machine(), evidence.residual(evidence.predict(Machine())));
+  const TrialValuesOf values(evidence, Machine(), evidence.residual(evidence.predict(Machine())),
+                             0);
   const std::vector<double> tried = values(mode, 1);
   EXPECT_TRUE(
       std::any_of(tried.begin(), tried.end(), [](double f) { return std::abs(f - 47) < 1.5; }));

@@ -72,6 +72,21 @@ TEST(Selection, FindsPeriodAndPhaseOfAWave) {
   EXPECT_NEAR(number_of(found, "effects.X.pitch_periodic.phase_deg"), 130, 5);
 }
 
+TEST(Selection, FindsAWaveThatALargeEffectHid) {
+  // Seen from the other axis, an ellipse has lines over the position of X that are all stronger.
+  Record record = toy::commands(1000, 4);
+  const Machine truth = toy::machine({{"effects.X.command_delay.delay_ms", 4},
+                                      {"effects.geometry.squareness.xy_urad", 3000},
+                                      {"effects.X.pitch_periodic.amplitude_um", 0.3},
+                                      {"effects.X.pitch_periodic.period_mm", 7.3},
+                                      {"effects.X.pitch_periodic.phase_deg", 130}});
+  toy::measure(record, truth, 21);
+  const SelectionResult result = search(record, Machine());
+  ASSERT_EQ(names(result, toy::candidates()),
+            "X.command_delay geometry.squareness X.pitch_periodic");
+  EXPECT_NEAR(number_of(result.found.machine, "effects.X.pitch_periodic.period_mm"), 7.3, 0.02);
+}
+
 TEST(Selection, AccusesNoCleanMachine) {
   for (std::uint64_t seed = 100; seed < 112; ++seed) {
     Record record = toy::commands(500, 4);
