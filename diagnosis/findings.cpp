@@ -23,6 +23,8 @@ namespace vcnc {
 namespace {
 
 constexpr double kQuiet = 1.05, kAllExplained = 0.98;
+/// What little an effect leaves is not explained by it where it is a tenth of what there was.
+constexpr double kSilent = 1.005, kMostExplained = 0.9;
 /// Times the noise by which a signal is off for something that is there, and part of what it was
 /// off by before that a model of what was found may be wrong by.
 constexpr double kLoud = 1.5, kWrongOfFound = 0.05;
@@ -671,8 +673,10 @@ class Report {
     else if (d_.law || !d_.vibrations.empty())
       d_.verdict = named ? partly : unexplained;
     else if (named)
-      d_.verdict = !still_off_ && (ratio < kQuiet || d_.explained_share > kAllExplained) ? explained
-                                                                                         : partly;
+      d_.verdict = !still_off_ && (ratio < kSilent || d_.explained_share > kAllExplained ||
+                                   (ratio < kQuiet && d_.explained_share > kMostExplained))
+                       ? explained
+                       : partly;
     else
       d_.verdict = !still_off_ && ratio < kQuiet ? no_deviation : unexplained;
     if (!d_.differential && !selection_.interrupted && evidence_.noise().from_repetitions &&

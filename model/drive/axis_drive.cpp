@@ -419,6 +419,7 @@ Real AxisDriveOf<Real>::rub(Real v, Real v_free, Real inertia) {
     chain.step(signal, {moment(kPlantTime, kPlantStepsPerLoop, plant_step_), lane(x_load_, i),
                         lane(v, i), lane(v_free, i)});
     set_lane(terms.dry, i, signal.dry);
+    set_lane(terms.skew, i, signal.skew);
     set_lane(terms.viscous, i, signal.viscous);
     set_lane(terms.stiffness, i, signal.stiffness);
     set_lane(terms.damping, i, signal.damping);

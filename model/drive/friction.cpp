@@ -15,15 +15,17 @@ Real FrictionOf<Real>::step(const FrictionPort::Signal<Real>& terms, Real v, Rea
   Real v1{}, bristle{};
   if (any(bristly)) {
     const Real shrink = 1.0 / (1.0 + terms.stiffness * abs(v) * dt / terms.dry);
+    const Real centre = terms.skew / terms.stiffness, bent = bristle_ - centre;
     // F_f = at_rest + slope * v1
     const Real at_rest =
-        bristle_ * (terms.stiffness * shrink + terms.damping * (shrink - 1.0) / dt);
+        bent * (terms.stiffness * shrink + terms.damping * (shrink - 1.0) / dt) + terms.skew;
     const Real slope = (terms.stiffness * dt + terms.damping) * shrink + terms.viscous;
     v1 = (v_free - mobility * at_rest) / (1.0 + mobility * slope);
-    bristle = (bristle_ + dt * v1) * shrink;
+    bristle = (bent + dt * v1) * shrink + centre;
   }
   if (!all(bristly)) {
-    const Real left = max(abs(v_free) - mobility * terms.dry, Real(0));
+    const Real level = terms.dry + copysign(Real(1), v_free) * terms.skew;
+    const Real left = max(abs(v_free) - mobility * level, Real(0));
     v1 = choose(bristly, v1, copysign(left / (1.0 + mobility * terms.viscous), v_free));
     bristle = choose(bristly, bristle, Real(0));
   }

@@ -14,9 +14,9 @@ struct FrictionAsymmetry {
       .title = "Friction that differs with the direction",
       .family = Family::friction,
       .brief = "more friction one way than the other: skewed wipers, a loaded gib, a worm",
-      .equation = R"(g = g_0 (1 + d_c s),   B = B_0 (1 + d_v s),   s = sgn(v)
-g_0, B_0: dry [N or N m] and viscous friction of the other effects, d_c, d_v: shares;
-at rest s is the direction in which the load is about to move)",
+      .equation = R"(dry friction slides at g (d_c s + 1) s,   B = B_0 (1 + d_v s),   s = sgn(v)
+g, B_0: dry [N or N m] and viscous friction of the other effects, d_c, d_v: shares;
+bristles bend about d_c g, so that a reversal is alike from either direction, and load)",
       .validity =
           R"(|d| <= 1, so that friction never drives. Acts on what the friction effects above it give and
 is nothing without them.)",
@@ -52,7 +52,7 @@ v. Quadrant glitches at the two ends of an axis are still alike: both jump by 2 
   void step(Port::Signal<T>& signal, const Port::Context<T>& context) const {
     const T v = context.velocity == 0.0 ? context.free_velocity : context.velocity;
     const double s = v > 0.0 ? 1 : v < 0.0 ? -1 : 0;
-    signal.dry *= 1 + dry * s;
+    signal.skew += dry * signal.dry;
     signal.viscous *= 1 + viscous * s;
   }
 };

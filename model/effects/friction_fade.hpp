@@ -48,7 +48,9 @@ factor; nothing remembers where it happened.)",
 
   template <class T>
   void step(Port::Signal<T>& signal, const Port::Context<T>& context) const {
-    signal.dry *= 1 + share * std::expm1(-context.moment.t / time_constant);
+    const double left = 1 + share * std::expm1(-context.moment.t / time_constant);
+    signal.dry *= left;
+    signal.skew *= left;
   }
 };
 

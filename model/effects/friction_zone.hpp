@@ -64,7 +64,9 @@ and quadrant glitches whose height depends on where the axis reverses.)",
   void step(Port::Signal<T>& signal, const Port::Context<T>& context) const {
     const T x = context.position - centre;
     const T from = x + 0.5 * width, to = 0.5 * width - x;
-    signal.dry *= 1 + height * rise(from) * rise(to);
+    const T here = 1 + height * rise(from) * rise(to);
+    signal.dry *= here;
+    signal.skew *= here;
   }
 
  private:

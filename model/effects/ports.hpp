@@ -186,6 +186,7 @@ struct FrictionPort {
   template <class T>
   struct Signal {
     T dry{};        ///< level of dry friction at this velocity [N]
+    T skew{};       ///< it slides at skew +- dry [N], |skew| <= dry
     T viscous{};    ///< [N s/m]
     T stiffness{};  ///< of the bristles, sigma0 [N/m]; 0: sticks without sliding
     T damping{};    ///< of the bristles, sigma1 [N s/m]

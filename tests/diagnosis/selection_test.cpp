@@ -73,10 +73,10 @@ TEST(Selection, FindsPeriodAndPhaseOfAWave) {
 }
 
 TEST(Selection, FindsAWaveThatALargeEffectHid) {
-  // Seen from the other axis, an ellipse has lines over the position of X that are all stronger.
+  // An ellipse over the position of X has lines that are all stronger than that of the wave.
   Record record = toy::commands(1000, 4);
-  const Machine truth = toy::machine({{"effects.X.command_delay.delay_ms", 4},
-                                      {"effects.geometry.squareness.xy_urad", 3000},
+  const Machine truth = toy::machine({{"effects.X.command_delay.delay_ms", 1},
+                                      {"effects.geometry.squareness.xy_urad", 300},
                                       {"effects.X.pitch_periodic.amplitude_um", 0.3},
                                       {"effects.X.pitch_periodic.period_mm", 7.3},
                                       {"effects.X.pitch_periodic.phase_deg", 130}});

@@ -225,7 +225,7 @@ TEST(FrictionEffects, NeverNegative) {
   for (const double d : {-1.0, 1.0})
     for (const double v : {-0.1, 0.1}) {
       const FrictionTerms t = terms(FrictionAsymmetry{.dry = d, .viscous = d}, 0, v, 0);
-      EXPECT_EQ(t.dry, d * v > 0 ? 500 : 0);
+      EXPECT_EQ(t.dry + std::copysign(t.skew, d * v), d * v > 0 ? 500 : 0);
       EXPECT_EQ(t.viscous, d * v > 0 ? 2000 : 0);
     }
   double lowest = 1;

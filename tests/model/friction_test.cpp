@@ -7,6 +7,7 @@
 #include <random>
 
 #include "model/effects/chain.hpp"
+#include "model/math.hpp"
 
 namespace vcnc {
 namespace {
@@ -54,6 +55,26 @@ Guide lugre() {
   Guide guide = stribeck();
   guide.presliding = {.stiffness = 2.5e7, .damping = 1.5e4};
   return guide;
+}
+
+// Once it has slid, friction that slides at w +- g is that which slides at +-g, and w: also while the
+// motion reverses, where a level by sgn v alone would bend the bristles otherwise.
+TEST(Friction, SkewIsAForceOnceItHasSlid) {
+  constexpr double kHeavy = 1e6, kLevel = 250, kSkew = 75;
+  const FrictionTerms even{.dry = kLevel, .viscous = 1000, .stiffness = 2.5e7, .damping = 1.5e4};
+  FrictionTerms skewed = even;
+  skewed.skew = kSkew;
+  Friction a, b;
+  double bent = 0;  // least and most of the bristles' force
+  for (int i = 0; i < 40000; ++i) {
+    const auto velocity = [](int k) { return 2e-3 * std::sin(2 * kPi * k / 10000.0); };
+    a.step(even, velocity(i), velocity(i + 1), kDt, kHeavy);
+    b.step(skewed, velocity(i), velocity(i + 1), kDt, kHeavy);
+    if (i < 4000) continue;
+    EXPECT_NEAR(b.force() - a.force(), kSkew, 0.01) << i;
+    bent = std::max(bent, std::abs(a.force()));
+  }
+  EXPECT_NEAR(bent, kLevel + 2, 1);
 }
 
 // Force needed to hold a velocity, found by holding it.
