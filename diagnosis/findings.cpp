@@ -23,7 +23,8 @@ namespace vcnc {
 namespace {
 
 constexpr double kQuiet = 1.05, kAllExplained = 0.98;
-/// What little an effect leaves is not explained by it where it is a tenth of what there was.
+/// What little an effect leaves is not explained by it where it is a tenth of what there was; what
+/// a drive that vibrates did is not compared.
 constexpr double kSilent = 1.005, kMostExplained = 0.9;
 /// Times the noise by which a signal is off for something that is there, and part of what it was
 /// off by before that a model of what was found may be wrong by.
@@ -674,7 +675,8 @@ class Report {
       d_.verdict = named ? partly : unexplained;
     else if (named)
       d_.verdict = !still_off_ && (ratio < kSilent || d_.explained_share > kAllExplained ||
-                                   (ratio < kQuiet && d_.explained_share > kMostExplained))
+                                   (ratio < kQuiet && (d_.explained_share > kMostExplained ||
+                                                       !before_.chatter.empty())))
                        ? explained
                        : partly;
     else
