@@ -16,6 +16,7 @@
 namespace vcnc {
 namespace {
 
+constexpr double kHopeless = 100;  ///< times what is to be explained: a loop that is unstable
 constexpr int kGlance = 4;         ///< iterations to see what a candidate is worth
 constexpr double kUsual = 1;       ///< decades about the typical size
 constexpr double kShows = 0.02;    ///< part of a gain that a channel must have to be concerned
@@ -291,7 +292,7 @@ Contender Contest::contender(const std::vector<std::size_t>& trials, const Eigen
     }
     c.candidate = rules_.trials[trials.front()].trial.candidate;
     c.fit = refit(rules_.evidence, c.begun, c.numbers, without(linear_, c.numbers), kGlance,
-                  Begin::far);
+                  Begin::far, {}, kHopeless * ground_.fitted);
     c.numbers = c.fit.live;
     c.gain = ground_.held_out - c.fit.held_out;
     const bool first = share == 1.0;

@@ -60,6 +60,11 @@ LeastSquaresSolution solve(const LeastSquaresProblem& problem) {
     solution.converged = true;
     return solution;
   }
+  if (std::isfinite(problem.hopeless_cost)) {
+    ++solution.evaluations;
+    solution.cost = problem.evaluate(solution.x, false).cost;
+    if (solution.cost > problem.hopeless_cost) return solution;
+  }
   ceres::Problem ceres_problem;
   double* x = solution.x.data();
   ceres_problem.AddResidualBlock(new Compressed(problem, solution.evaluations), nullptr, x);

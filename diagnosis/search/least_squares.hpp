@@ -7,6 +7,7 @@
 
 #include <Eigen/Dense>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,8 @@ struct LeastSquaresProblem {
   bool cautious = false;  ///< begins with short steps: far from linear
   int max_iterations = 12;
   double cost_tolerance = 1e-5;  ///< relative change of the cost at which it is content
+  /// Above this at the start, it stays there.
+  double hopeless_cost = std::numeric_limits<double>::infinity();
 };
 
 struct LeastSquaresSolution {

@@ -196,7 +196,7 @@ std::vector<Column> columns_of(const Evidence& evidence, const Machine& machine,
 
 Refit refit(const Evidence& evidence, const Machine& start, const std::vector<FreedNumber>& live,
             const LinearPart& linear, int max_iterations, Begin begin,
-            const std::vector<double>& weight) {
+            const std::vector<double>& weight, double hopeless) {
   Refit result;
   const auto k = static_cast<Eigen::Index>(live.size());
   const Products products(evidence, linear.columns);
@@ -226,6 +226,7 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
   LeastSquaresProblem problem;
   problem.start.resize(k), problem.min.resize(k), problem.max.resize(k);
   problem.max_iterations = max_iterations;
+  problem.hopeless_cost = hopeless;
   problem.cautious =
       begin == Begin::far &&
       std::any_of(live.begin(), live.end(), [](const FreedNumber& n) { return n.shape; });

@@ -157,6 +157,13 @@ TEST(LeastSquares, SolvesRosenbrockWithinBounds) {
   s = solve(problem);
   EXPECT_NEAR(s.x[0], 0.5, 1e-5);
   EXPECT_NEAR(s.x[1], 0.25, 1e-4);
+  // From where it is hopeless no search begins; the start costs 24.2.
+  problem.hopeless_cost = 25;
+  EXPECT_NEAR(solve(problem).x[0], 0.5, 1e-5);
+  problem.hopeless_cost = 24;
+  s = solve(problem);
+  EXPECT_EQ(s.x, problem.start);
+  EXPECT_EQ(s.evaluations, 1);
 }
 
 TEST(RoleGrams, StepsLeaveWhatTheyLeaveOfTheColumnsThemselves) {
