@@ -57,8 +57,8 @@ Guide lugre() {
   return guide;
 }
 
-// Once it has slid, friction that slides at w +- g is that which slides at +-g, and w: also while the
-// motion reverses, where a level by sgn v alone would bend the bristles otherwise.
+// Once it has slid, friction that slides at w +- g is that which slides at +-g, and w: also while
+// the motion reverses, where a level by sgn v alone would bend the bristles otherwise.
 TEST(Friction, SkewIsAForceOnceItHasSlid) {
   constexpr double kHeavy = 1e6, kLevel = 250, kSkew = 75;
   const FrictionTerms even{.dry = kLevel, .viscous = 1000, .stiffness = 2.5e7, .damping = 1.5e4};
