@@ -8,6 +8,37 @@
 namespace vcnc {
 namespace {
 
+/// Within the bounds: a step ends at them, and a number that would leave them stays.
+/// Ceres' own bounds search along every step that meets one, at the price of many linearisations.
+class Box : public ceres::Manifold {
+ public:
+  explicit Box(const LeastSquaresProblem& problem) : problem_(problem) {}
+
+  int AmbientSize() const override { return static_cast<int>(problem_.start.size()); }
+  int TangentSize() const override { return AmbientSize(); }
+
+  bool Plus(const double* x, const double* step, double* to) const override {
+    vector(to) = (vector(x) + vector(step)).cwiseMax(problem_.min).cwiseMin(problem_.max);
+    return true;
+  }
+  bool Minus(const double* y, const double* x, double* step) const override {
+    vector(step) = vector(y) - vector(x);
+    return true;
+  }
+  bool PlusJacobian(const double*, double* jacobian) const override { return identity(jacobian); }
+  bool MinusJacobian(const double*, double* jacobian) const override { return identity(jacobian); }
+
+ private:
+  Eigen::Map<const Eigen::VectorXd> vector(const double* x) const { return {x, AmbientSize()}; }
+  Eigen::Map<Eigen::VectorXd> vector(double* x) const { return {x, AmbientSize()}; }
+  bool identity(double* jacobian) const {
+    Eigen::Map<Eigen::MatrixXd>(jacobian, AmbientSize(), AmbientSize()).setIdentity();
+    return true;
+  }
+
+  const LeastSquaresProblem& problem_;
+};
+
 /// The k + 1 residuals of the header.
 class Compressed : public ceres::CostFunction {
  public:
@@ -42,6 +73,9 @@ class Compressed : public ceres::CostFunction {
     Eigen::Map<RowMajor> jacobian(jacobians[0], k + 1, k);
     jacobian.setZero();
     jacobian.topRows(k) = Eigen::MatrixXd(factor.matrixU());
+    for (Eigen::Index i = 0; i < k; ++i)
+      if (at.gradient[i] > 0 ? x[0][i] <= problem_.min[i] : x[0][i] >= problem_.max[i])
+        jacobian.col(i).setZero();
     return true;
   }
 
@@ -68,10 +102,7 @@ LeastSquaresSolution solve(const LeastSquaresProblem& problem) {
   ceres::Problem ceres_problem;
   double* x = solution.x.data();
   ceres_problem.AddResidualBlock(new Compressed(problem, solution.evaluations), nullptr, x);
-  for (int i = 0; i < static_cast<int>(solution.x.size()); ++i) {
-    if (std::isfinite(problem.min[i])) ceres_problem.SetParameterLowerBound(x, i, problem.min[i]);
-    if (std::isfinite(problem.max[i])) ceres_problem.SetParameterUpperBound(x, i, problem.max[i]);
-  }
+  ceres_problem.SetManifold(x, new Box(problem));
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
   options.max_num_iterations = problem.max_iterations;

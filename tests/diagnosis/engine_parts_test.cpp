@@ -136,6 +136,33 @@ TEST(Partition, OfOneLongMotionFitsAndHoldsOutInTurns) {
   EXPECT_EQ(held_out, 12000U);
 }
 
+TEST(LeastSquares, GoesAlongABoundWithOneLinearisationPerStep) {
+  // Linear in three numbers that pull at each other; the first one belongs outside of its bound.
+  LeastSquaresProblem problem;
+  problem.start = Eigen::Vector3d(0, 0, 0);
+  problem.min = Eigen::Vector3d(-1, -10, -std::numeric_limits<double>::infinity());
+  problem.max = Eigen::Vector3d(1, 10, std::numeric_limits<double>::infinity());
+  Eigen::Matrix3d a;
+  a << 1, 0.5, 0, 0.5, 1, 0.5, 0, 0.5, 1;
+  const Eigen::Vector3d b(4, 1, 2);
+  problem.cost_tolerance = 1e-12;
+  int linearisations = 0;
+  problem.evaluate = [&](const Eigen::VectorXd& x, bool with_derivatives) {
+    linearisations += with_derivatives;
+    const Eigen::Vector3d r = a * x - b;
+    return Linearisation{r.squaredNorm(), a.transpose() * r, a.transpose() * a};
+  };
+  const LeastSquaresSolution s = solve(problem);
+  const Eigen::Matrix<double, 3, 2> rest = a.rightCols<2>();
+  const Eigen::Vector2d others =
+      (rest.transpose() * rest).ldlt().solve(rest.transpose() * (b - a.col(0)));
+  EXPECT_DOUBLE_EQ(s.x[0], 1);
+  EXPECT_NEAR(s.x[1], others[0], 1e-4);
+  EXPECT_NEAR(s.x[2], others[1], 1e-4);
+  EXPECT_TRUE(s.converged);
+  EXPECT_LE(linearisations, 8);
+}
+
 TEST(LeastSquares, SolvesRosenbrockWithinBounds) {
   LeastSquaresProblem problem;
   problem.start = Eigen::Vector2d(-1.2, 1);
