@@ -291,8 +291,9 @@ Contender Contest::contender(const std::vector<std::size_t>& trials, const Eigen
       at += width;
     }
     c.candidate = rules_.trials[trials.front()].trial.candidate;
-    c.fit = refit(rules_.evidence, c.begun, c.numbers, without(linear_, c.numbers), kGlance,
-                  Begin::far, {}, kHopeless * ground_.fitted);
+    c.fit = refit(
+        rules_.evidence, c.begun, c.numbers, without(linear_, c.numbers),
+        {.max_iterations = kGlance, .begin = Begin::far, .hopeless = kHopeless * ground_.fitted});
     c.numbers = c.fit.live;
     c.gain = ground_.held_out - c.fit.held_out;
     const bool first = share == 1.0;

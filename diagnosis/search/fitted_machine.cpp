@@ -267,8 +267,8 @@ void converge(const Evidence& evidence, FittedMachine& m) {
     const std::vector<FreedNumber> live = m.numbers();
     const std::vector<double> weight = weights(evidence, residual);
     const double least = misfit(evidence, residual, weight, m.nuisances.numbers);
-    const Refit f =
-        refit(evidence, m.machine, live, without(m.nuisances, live), 8, Begin::near, weight);
+    const Refit f = refit(evidence, m.machine, live, without(m.nuisances, live),
+                          {.max_iterations = 8, .weight = weight});
     if (!step_towards(evidence, m, f, weight, least)) {
       if (round == 0) stay(evidence, m);
       break;

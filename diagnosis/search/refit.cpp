@@ -195,8 +195,7 @@ std::vector<Column> columns_of(const Evidence& evidence, const Machine& machine,
 }
 
 Refit refit(const Evidence& evidence, const Machine& start, const std::vector<FreedNumber>& live,
-            const LinearPart& linear, int max_iterations, Begin begin,
-            const std::vector<double>& weight, double hopeless) {
+            const LinearPart& linear, const RefitOptions& options) {
   Refit result;
   const auto k = static_cast<Eigen::Index>(live.size());
   const Products products(evidence, linear.columns);
@@ -225,10 +224,10 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
 
   LeastSquaresProblem problem;
   problem.start.resize(k), problem.min.resize(k), problem.max.resize(k);
-  problem.max_iterations = max_iterations;
-  problem.hopeless_cost = hopeless;
+  problem.max_iterations = options.max_iterations;
+  problem.hopeless_cost = options.hopeless;
   problem.cautious =
-      begin == Begin::far &&
+      options.begin == Begin::far &&
       std::any_of(live.begin(), live.end(), [](const FreedNumber& n) { return n.shape; });
   for (std::size_t i = 0; i < live.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
@@ -242,7 +241,7 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
     const std::vector<Column> none;
     const Eigen::Index used = derivatives ? k : 0;
     const Eigen::MatrixXd g =
-        products.with(p.residual, derivatives ? p.columns : none).fitted_with(weight);
+        products.with(p.residual, derivatives ? p.columns : none).fitted_with(options.weight);
     const Eliminated e = eliminate(g, used, linear);
     Linearisation at{e.cost, {}, {}};
     if (derivatives) {
@@ -266,8 +265,8 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
 
   Point& best = visit(solution.x, true);
   const RoleGrams grams = products.with(best.residual, {});
-  const LinearStep step =
-      linear_step(grams.fitted_with(weight), grams.held_out, linear.precision(), linear.offset());
+  const LinearStep step = linear_step(grams.fitted_with(options.weight), grams.held_out,
+                                      linear.precision(), linear.offset());
   result.live = moved(live, solution.x);
   result.linear = linear.numbers;
   for (std::size_t i = 0; i < result.linear.size(); ++i) {

@@ -62,12 +62,16 @@ struct Refit {
 /// How a search begins: as sensitivities tell, or with short steps where shapes are far off.
 enum class Begin { near, far };
 
-/// `weight` of each channel's chi-square in what is made least; none given: all 1. `hopeless`: a
-/// chi-square from which no search begins.
+struct RefitOptions {
+  int max_iterations = 12;
+  Begin begin = Begin::near;
+  std::vector<double> weight = {};  ///< of each channel's chi-square in what is made least; none: 1
+  /// A chi-square from which no search begins.
+  double hopeless = std::numeric_limits<double>::infinity();
+};
+
 Refit refit(const Evidence& evidence, const Machine& start, const std::vector<FreedNumber>& live,
-            const LinearPart& linear, int max_iterations = 12, Begin begin = Begin::near,
-            const std::vector<double>& weight = {},
-            double hopeless = std::numeric_limits<double>::infinity());
+            const LinearPart& linear, const RefitOptions& options = {});
 
 /// Forward differences of a prediction with respect to some numbers, per typical size.
 std::vector<Column> columns_of(const Evidence& evidence, const Machine& machine,
