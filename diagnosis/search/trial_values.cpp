@@ -56,6 +56,41 @@ void follow_values(std::vector<double>& found, const std::vector<double>& known,
       if (same(value, k)) value = k;
 }
 
+/// Of a long record only some samples are looked at.
+double share_of_samples(const Record& record) {
+  return std::min(1.0, kMostSamples / static_cast<double>(record.samples()));
+}
+
+/// That share of the fitted laps, at irregular intervals, so that short waves are not taken for
+/// long ones.
+std::vector<std::size_t> fitted_samples(const Evidence& evidence, double share) {
+  constexpr double kGolden = 0.6180339887498949;
+  std::vector<std::size_t> samples;
+  for (const Block& block : evidence.partition().blocks)
+    for (std::size_t k = block.begin; k < block.end && !block.held_out; ++k) {
+      const double turn = kGolden * static_cast<double>(k);
+      if (turn - std::floor(turn) <= share) samples.push_back(k);
+    }
+  return samples;
+}
+
+struct Line {
+  double waves, power;
+  Eigen::Index channel;
+};
+
+/// Peaks of the powers of each channel, the strongest first.
+std::vector<Line> lines_of(const Eigen::ArrayXXd& power, double least) {
+  std::vector<Line> lines;
+  for (Eigen::Index c = 0; c < power.cols(); ++c)
+    for (Eigen::Index i = 1; i + 1 < power.rows(); ++i)
+      if (power(i, c) >= power(i - 1, c) && power(i, c) > power(i + 1, c) && power(i, c) >= least)
+        lines.push_back({kWaves.waves(i), power(i, c), c});
+  std::sort(lines.begin(), lines.end(),
+            [](const Line& x, const Line& y) { return x.power > y.power; });
+  return lines;
+}
+
 }  // namespace
 
 Eigen::ArrayXXd line_powers(const Eigen::ArrayXd& position, const Eigen::ArrayXXd& z, double length,
@@ -136,17 +171,8 @@ std::vector<double> TrialValuesOf::find_wavelengths(std::size_t axis, const Colu
     if ((channel.kind == SignalKind::deflection || channel.axis == axis) && !residual[c].empty())
       channels.push_back(c);
   }
-  // All samples of the fitted laps, or of a long record some at irregular intervals, so that short
-  // waves are not taken for long ones.
-  std::vector<std::size_t> samples;
-  const double share =
-      std::min(1.0, kMostSamples / static_cast<double>(evidence_->record().samples()));
-  constexpr double kGolden = 0.6180339887498949;
-  for (const Block& block : evidence_->partition().blocks)
-    for (std::size_t k = block.begin; k < block.end && !block.held_out; ++k) {
-      const double turn = kGolden * static_cast<double>(k);
-      if (turn - std::floor(turn) <= share) samples.push_back(k);
-    }
+  const double share = share_of_samples(record);
+  const std::vector<std::size_t> samples = fitted_samples(*evidence_, share);
   const auto count = static_cast<Eigen::Index>(samples.size());
   Eigen::ArrayXd position(count);
   Eigen::ArrayXXd z(count, static_cast<Eigen::Index>(channels.size()));
@@ -158,20 +184,8 @@ std::vector<double> TrialValuesOf::find_wavelengths(std::size_t axis, const Colu
   }
   const Eigen::ArrayXXd power = line_powers(position, z, travel, kWaves);
 
-  struct Line {
-    double waves, power;
-    Eigen::Index channel;
-  };
-  std::vector<Line> lines;
-  for (Eigen::Index c = 0; c < z.cols(); ++c)
-    for (Eigen::Index i = 1; i + 1 < kWaves.count; ++i)
-      if (power(i, c) >= power(i - 1, c) && power(i, c) > power(i + 1, c) &&
-          power(i, c) >= share * least_gain)
-        lines.push_back({kWaves.waves(i), power(i, c), c});
-  std::sort(lines.begin(), lines.end(),
-            [](const Line& x, const Line& y) { return x.power > y.power; });
   std::vector<double> best;
-  for (const Line& line : lines) {
+  for (const Line& line : lines_of(power, share * least_gain)) {
     const bool known = std::any_of(best.begin(), best.end(), [&](double w) {
       return std::abs(travel / w - line.waves) < kSameWaves;
     });
