@@ -87,9 +87,6 @@ class Ring final : public Piece {
       result.n = end;
     }
     result.foot = p - result.distance * result.n;
-    const Vec3 e1 = axis_.unitOrthogonal();
-    result.u = std::atan2(axis_.cross(e1).dot(m.radial), e1.dot(m.radial));
-    result.v = m.h;
     return result;
   }
 

@@ -36,8 +36,8 @@ struct SurfacePoint {
   double distance = 0;       ///< signed distance of the query point [m]
   Vec3 n = Vec3::UnitZ();    ///< outward unit normal, from the material to the probe
   Vec3 foot = Vec3::Zero();  ///< the nearest surface point
-  double u = 0, v = 0;  ///< parameters of the foot (ruled), else angle/height where they make sense
-  bool valid = false;   ///< Newton converged (always true for closed forms)
+  double u = 0, v = 0;       ///< parameters of the foot on a ruled piece
+  bool valid = false;        ///< Newton converged (always true for closed forms)
 };
 
 /// One station of a scan path: the ball touches the surface here.
