@@ -76,7 +76,7 @@ std::string effect_box(const FoundEffect& e) {
                     escaped(n.key), with_interval(n), escaped(unit_of_key(n.key)), interval_bar(n));
   text += "</table><p>";
   if (std::isfinite(e.gain))
-    text += fmt::format("Chi-square gained on what was held out: {:.0f}. ", e.gain);
+    text += fmt::format("Chi-square gained on what was held out: {:.3g}. ", e.gain);
   text += fmt::format("Contour error: {:+.3g} µm rms.</p>\n", e.contour_error_um);
   if (!e.class_with.empty()) {
     std::string others;
