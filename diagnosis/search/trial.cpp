@@ -23,6 +23,14 @@ bool contains(const std::string& text, const char* part) {
   return text.find(part) != std::string::npos;
 }
 
+/// Periods that the wave of a trial has per turn of its phase: of n lobes the phase is the
+/// direction of one, A cos(n (theta - psi)).
+double periods_per_turn(const Candidate& c, const Trial& trial) {
+  for (std::size_t i = 0; i < c.numbers.size(); ++i)
+    if (contains(c.numbers[i].key, ".lobes")) return trial.values[i];
+  return 1;
+}
+
 }  // namespace
 
 bool is_fixed(const FreeNumber& n) {
@@ -102,7 +110,7 @@ Machine machine_of(const Machine& base, const Candidate& candidate, const Trial&
   for (std::size_t i = 0; i < candidate.numbers.size(); ++i) {
     double value = trial.values[i];
     if (i == direction.number) value += direction.step;
-    if (i == phase && direction.quadrature) value = 90;
+    if (i == phase && direction.quadrature) value = 90 / periods_per_turn(candidate, trial);
     move_number(machine, candidate.numbers[i].key, value);
   }
   return machine;
@@ -136,7 +144,7 @@ std::vector<FreedNumber> start_of(const Candidate& candidate, const Trial& trial
       largest = does[i];
       angle = std::atan2(across[i], in[i]);
     }
-    values[phase] = angle / kDegree;
+    values[phase] = angle / kDegree / periods_per_turn(candidate, trial);
   }
   std::vector<FreedNumber> numbers;
   for (std::size_t i = 0; i < values.size(); ++i) {

@@ -24,7 +24,7 @@ namespace vcnc {
 
 struct Direction {
   std::size_t number = 0;   ///< index of the amplitude
-  bool quadrature = false;  ///< with the phase at 90 deg
+  bool quadrature = false;  ///< with the phase a quarter of a period on
   double step = 0;          ///< change of the amplitude, in the unit of its key
   bool whole = false;       ///< the step is the amplitude, not a measure of it
 };

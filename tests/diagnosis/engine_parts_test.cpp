@@ -577,6 +577,50 @@ TEST(Trials, TheAngleOfAWeightIsAPhase) {
   EXPECT_FALSE(is_phase({"effects.probe.signal_phase.angle_deg.x"}));
 }
 
+/// What a lobed ball adds to its radius, by the direction of the surface normal.
+Eigen::VectorXd lobes_over_a_turn(const Machine& machine) {
+  Eigen::VectorXd radius(90);
+  for (Eigen::Index i = 0; i < radius.size(); ++i) {
+    const double theta = 2 * kPi * static_cast<double>(i) / static_cast<double>(radius.size());
+    TouchPort::Signal<double> ball;
+    TouchPort::Context<double> context;
+    context.normal_T = Vec3(std::cos(theta), std::sin(theta), 0);
+    machine.effects.get<TipLobing>().step(ball, context);
+    radius[i] = ball.radius;
+  }
+  return radius;
+}
+
+/// The phase of lobes is the direction of one: a quarter of a period is no quarter of a turn.
+TEST(Trials, LobesStartWhereTheyPointTo) {
+  const Candidate lobing{"tip_lobing",
+                         "probe",
+                         {{"effects.probe.tip_lobing.amplitude_um", 1, -300, 300, true},
+                          {"effects.probe.tip_lobing.lobes", 3, 2, 12, false, true},
+                          {"effects.probe.tip_lobing.phase_deg", 0, -360, 360}},
+                         {1, 2}};
+  for (const Trial& trial : trials(Machine(), {lobing}, [](const Candidate&, std::size_t) {
+         return std::vector<double>{2, 3, 4, 5};
+       })) {
+    Machine truth;
+    set_whole_numbers(truth, lobing, trial);
+    move_number(truth, "effects.probe.tip_lobing.amplitude_um", 1.6);
+    move_number(truth, "effects.probe.tip_lobing.phase_deg", -70);
+    const Eigen::VectorXd wanted = lobes_over_a_turn(truth);
+    ASSERT_EQ(trial.directions.size(), 2U);
+    Eigen::MatrixXd columns(wanted.size(), 2);
+    for (Eigen::Index d = 0; d < 2; ++d)
+      columns.col(d) = lobes_over_a_turn(
+          machine_of(Machine(), lobing, trial, trial.directions[static_cast<std::size_t>(d)]));
+    const Eigen::VectorXd size = columns.colPivHouseholderQr().solve(wanted);
+    Machine started;
+    set_whole_numbers(started, lobing, trial);
+    for (const FreedNumber& n : start_of(lobing, trial, size, Eigen::Vector2d(1, 1)))
+      move_number(started, n.number.key, n.value);
+    EXPECT_LT((lobes_over_a_turn(started) - wanted).norm(), 1e-9 * wanted.norm());
+  }
+}
+
 TEST(Intervals, KnowThatALawIsKnownToTwoPercentOnly) {
   Record record = toy::commands(400, 4);
   const Machine truth = toy::machine({{"effects.X.load_play.width_um", 5}});
