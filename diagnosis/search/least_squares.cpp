@@ -84,6 +84,23 @@ class Compressed : public ceres::CostFunction {
   int& evaluations_;
 };
 
+/// Ends a search after a step in vain that was nearly of Gauss-Newton's length, or after some.
+class InVain : public ceres::IterationCallback {
+ public:
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& i) override {
+    if (i.iteration == 0) return ceres::SOLVER_CONTINUE;
+    steps_ = i.step_is_successful ? 0 : steps_ + 1;
+    const bool long_step = steps_ > 0 && i.trust_region_radius > kLong;
+    return long_step || given_up() ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+  }
+  bool given_up() const { return steps_ >= kMost; }
+
+ private:
+  static constexpr double kLong = 10;
+  static constexpr int kMost = 4;  ///< of 1, 1/2, 1/3 and 1/9 of the length
+  int steps_ = 0;                  ///< in vain, one after the other
+};
+
 }  // namespace
 
 LeastSquaresSolution solve(const LeastSquaresProblem& problem) {
@@ -105,16 +122,25 @@ LeastSquaresSolution solve(const LeastSquaresProblem& problem) {
   ceres_problem.SetManifold(x, new Box(problem));
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
-  options.max_num_iterations = problem.max_iterations;
   options.function_tolerance = problem.cost_tolerance;
   options.parameter_tolerance = 1e-7;
   options.gradient_tolerance = 1e-12;
-  // Of columns scaled to one: start as Gauss-Newton, or half as far.
-  options.initial_trust_region_radius = problem.cautious ? 1 : 1e6;
   options.logging_type = ceres::SILENT;
   options.num_threads = 1;
+  InVain in_vain;
+  options.callbacks.push_back(&in_vain);
+  // Of columns scaled to one: start as Gauss-Newton, or half as far. What Ceres shortens a step in
+  // vain by is next to nothing at such a radius, so the next one begins half as far, too.
+  constexpr double kGaussNewton = 1e6, kHalfAsFar = 1;
+  options.initial_trust_region_radius = problem.cautious ? kHalfAsFar : kGaussNewton;
+  options.max_num_iterations = problem.max_iterations;
   ceres::Solver::Summary summary;
-  ceres::Solve(options, &ceres_problem, &summary);
+  do {
+    ceres::Solve(options, &ceres_problem, &summary);
+    options.initial_trust_region_radius = kHalfAsFar;
+    options.max_num_iterations -= static_cast<int>(summary.iterations.size()) - 1;
+  } while (summary.termination_type == ceres::USER_SUCCESS && !in_vain.given_up() &&
+           options.max_num_iterations > 0);
   solution.cost = 2 * summary.final_cost;
   solution.converged = summary.termination_type == ceres::CONVERGENCE;
   return solution;

@@ -160,7 +160,23 @@ TEST(LeastSquares, GoesAlongABoundWithOneLinearisationPerStep) {
   EXPECT_NEAR(s.x[1], others[0], 1e-4);
   EXPECT_NEAR(s.x[2], others[1], 1e-4);
   EXPECT_TRUE(s.converged);
-  EXPECT_LE(linearisations, 8);
+  EXPECT_LE(linearisations, 10);
+}
+
+TEST(LeastSquares, GivesUpWhereTheSensitivitiesAreWrong) {
+  LeastSquaresProblem problem;
+  problem.start = Eigen::Vector2d(3, 4);
+  problem.min = Eigen::Vector2d(-100, -100);
+  problem.max = Eigen::Vector2d(100, 100);
+  problem.evaluate = [&](const Eigen::VectorXd& x, bool) {
+    const Eigen::Vector2d promised(1, 2);  // but it only gets worse
+    return Linearisation{100 + (x - problem.start).norm(), promised, Eigen::Matrix2d::Identity()};
+  };
+  const LeastSquaresSolution s = solve(problem);
+  EXPECT_EQ(s.x, problem.start);
+  EXPECT_FALSE(s.converged);
+  EXPECT_DOUBLE_EQ(s.cost, 100);
+  EXPECT_LE(s.evaluations, 7);  // the start, again for its derivatives, and four steps
 }
 
 TEST(LeastSquares, SolvesRosenbrockWithinBounds) {
