@@ -354,9 +354,47 @@ void check_written(const Machine& m, const std::string& name) {
                     m.setup.predeflection / unit::mm.to_si, m.probe.range / unit::mm.to_si));
 }
 
+/// The number whose key is spelled most like one that there is not: one that begins so, else the
+/// nearest.
+const Parameter& nearest_number(const std::vector<Parameter>& known, const std::string& key) {
+  const auto off = [&](const Parameter& p) {
+    return p.key.starts_with(key) ? 0 : edit_distance(key, p.key);
+  };
+  return *std::min_element(known.begin(), known.end(),
+                           [&](const auto& a, const auto& b) { return off(a) < off(b); });
+}
+
+/// Bounds that hold what is declared, of numbers that there are.
+void check_uncertainties(const Machine& m, const std::string& name) {
+  Machine copy = m;
+  std::set<std::string> known;
+  for (const Uncertainty& u : m.uncertainties) {
+    const std::string where = name + ": uncertainty";
+    if (u.key.empty()) throw ConfigError(where + ": key is missing");
+    const std::optional<Parameter> number = find_parameter(copy, u.key);
+    if (!number) {
+      throw ConfigError(fmt::format("{}: {} is not a number of a machine file; did you mean {}?",
+                                    where, u.key, nearest_number(parameters(copy), u.key).key));
+    }
+    if (!known.insert(u.key).second)
+      throw ConfigError(fmt::format("{}: {} is given twice", where, u.key));
+    if (u.between.empty()) continue;
+    const double value = number->in_unit();
+    if (u.between.size() != 2 || !(u.between[0] < u.between[1]))
+      throw ConfigError(fmt::format("{}: {}: between: expected [least, most]", where, u.key));
+    if (u.between[0] < number->range.min || u.between[1] > number->range.max)
+      throw ConfigError(fmt::format("{}: {}: between: allowed {} .. {} {}", where, u.key,
+                                    number->range.min, number->range.max, number->unit.suffix));
+    if (value < u.between[0] || value > u.between[1])
+      throw ConfigError(fmt::format("{}: {}: {:g} is declared, which is not between {:g} and {:g}",
+                                    where, u.key, value, u.between[0], u.between[1]));
+  }
+}
+
 /// The same of the machine as it is, and of what makes it so.
 void check_whole(const Machine& m, const std::string& name) {
   check_written(m, name);
+  check_uncertainties(m, name);
   for (std::size_t i = 0; i < m.effects.laws.size(); ++i)
     if (const std::string objection = m.effects.laws[i].objection(); !objection.empty())
       throw ConfigError(fmt::format("{}: effects.law {}: {}", name, i + 1, objection));
@@ -389,13 +427,10 @@ void refuse_wrong_place(const std::string& key, const std::vector<Parameter>& kn
   const std::string first = key.substr(0, key.find('.'));
   for (const char* table : {"axes", "kinematics", "spindle", "bus"}) {
     if (first != table) continue;
-    const Parameter* nearest = nullptr;
-    for (const Parameter& p : known)
-      if (!p.key.starts_with("effects.") &&
-          (nearest == nullptr || edit_distance(key, p.key) < edit_distance(key, nearest->key)))
-        nearest = &p;
+    std::vector<Parameter> declared = known;
+    std::erase_if(declared, [](const Parameter& p) { return p.key.starts_with("effects."); });
     throw ConfigError(fmt::format("{}: {} is not a number of a machine file; did you mean {}?",
-                                  name, key, nearest->key));
+                                  name, key, nearest_number(declared, key).key));
   }
   for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
     if (first != Effect::text.name) return;

@@ -207,6 +207,7 @@ Diagnosis diagnose(const DiagnosisCase& of, const DiagnosisOptions& options,
 Diagnosis diagnose(const DiagnosisCase& of, const DifferentialRecord& difference,
                    const DiagnosisOptions& options, const KeepGoing& keep_going) {
   DiagnosisOptions with_common = options;
+  with_common.against = Against::healthy_run;
   with_common.common = common_numbers(difference.healthy);
   ReplicaOfChange replica(of.replica, difference.healthy, with_common.common);
   // A change of such a number would be no change.

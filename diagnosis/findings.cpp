@@ -99,6 +99,7 @@ class Report {
   Diagnosis write() {
     tell_slip();
     tell_effects();
+    tell_uncertain();
     tell_clamping();
     tell_noise_lines();
     tell_events();
@@ -150,14 +151,42 @@ class Report {
     return true;
   }
 
+  static FittedNumber with_interval_of(const FreedNumber& n,
+                                       const std::map<std::string, Interval>& intervals) {
+    const auto i = intervals.find(n.number.key);
+    const double half = i == intervals.end() ? 0 : i->second.half_width;
+    return {n.number.key, n.value, std::max(n.number.min, n.value - half),
+            std::min(n.number.max, n.value + half)};
+  }
+
+  /// Numbers that the declared machine calls uncertain, where nothing else is said of them.
+  void tell_uncertain() {
+    if (d_.differential || of_.declared.uncertainties.empty()) return;
+    const std::map<std::string, Interval> intervals = intervals_of(evidence_, found(), inexact_);
+    for (const Uncertainty& u : of_.declared.uncertainties) {
+      if (u.exact()) continue;
+      const std::vector<FreedNumber>& along = found().nuisances.numbers;
+      const auto n = std::find_if(along.begin(), along.end(),
+                                  [&](const FreedNumber& f) { return f.number.key == u.key; });
+      const bool told = std::any_of(d_.effects.begin(), d_.effects.end(), [&](const auto& e) {
+        return std::any_of(e.numbers.begin(), e.numbers.end(),
+                           [&](const FittedNumber& f) { return f.key == u.key; });
+      });
+      if (told) continue;
+      const bool shown = n != along.end();
+      const FittedNumber fit = shown ? with_interval_of(*n, intervals) : FittedNumber{};
+      if (shown && !(u.free() && fit.low <= u.between[0] && fit.high >= u.between[1])) {
+        d_.uncertain.push_back(fit);
+        continue;
+      }
+      d_.notes.push_back(u.key + " is declared as uncertain, and this run does not show it.");
+      move_number(d_.found, u.key, number_of(of_.declared, u.key));
+    }
+  }
+
   void tell_effects() {
     const std::map<std::string, Interval> intervals = intervals_of(evidence_, found(), inexact_);
-    const auto fitted = [&](const FreedNumber& n) {
-      const auto i = intervals.find(n.number.key);
-      const double half = i == intervals.end() ? 0 : i->second.half_width;
-      return FittedNumber{n.number.key, n.value, std::max(n.number.min, n.value - half),
-                          std::min(n.number.max, n.value + half)};
-    };
+    const auto fitted = [&](const FreedNumber& n) { return with_interval_of(n, intervals); };
     for (const AddedEffect& a : found().added) {
       const Candidate& candidate = of_.candidates[a.candidate];
       if (!(a.gain > options_.least_gain)) {

@@ -334,6 +334,29 @@ struct SetupParams {
   }
 };
 
+/// How well a number of the file is known where a diagnosis is to believe something else of it than
+/// it does of its kind (diagnosis/search/freed_number.hpp).
+struct Uncertainty {
+  std::string key;      ///< any number of the machine, effects included
+  double standard = 0;  ///< standard uncertainty, in the unit of the key
+  /// Bounds, in the unit of the key; empty: those of the key. With bounds and no standard
+  /// uncertainty nothing is known but these.
+  std::vector<double> between;
+
+  bool exact() const { return standard == 0 && between.empty(); }
+  /// Whether no value within the bounds is more likely than another.
+  bool free() const { return standard == 0 && !between.empty(); }
+
+  template <class Self, class Visit>
+  static void fields(Self& p, Visit& visit) {
+    visit("key", p.key, "a number of this file, effects included, e.g. axes.X.kv_per_s");
+    visit("standard", p.standard, Unit{"", 1}, Range{0, 1e12},
+          "standard uncertainty in the unit of the key; 0 without bounds: known exactly");
+    visit("between", p.between, Unit{"", 1}, Range{-1e12, 1e12},
+          "[least, most] in the unit of the key; without a standard uncertainty: free within");
+  }
+};
+
 /// What a model that was fitted to a healthy run leaves of one of its signals, noise aside: the
 /// error of the model's form, which is nothing that needs a cause.
 struct CommissionedSignal {
@@ -361,6 +384,7 @@ struct Machine {
   NcParams nc;
   SetupParams setup;
   Effects effects;
+  std::vector<Uncertainty> uncertainties;
   std::vector<CommissionedSignal> commissioned;
 
   Machine();  ///< sensible limits and masses for every axis
@@ -383,6 +407,9 @@ struct Machine {
     visit.group("nc", p.nc, "NC unit");
     visit.group("setup", p.setup, "workpiece, offsets, evaluation");
     visit.group("effects", p.effects, "what a real machine does besides");
+    visit.list("uncertainty", p.uncertainties,
+               "how well a number is known, for a diagnosis; others are of the tolerance of their "
+               "kind (docs/diagnosis.md)");
     visit.list("commissioned", p.commissioned,
                "what a fit to a healthy run left (vcnc commission)");
   }

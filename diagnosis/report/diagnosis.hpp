@@ -84,7 +84,8 @@ struct Diagnosis {
   HeldOut chi2;
   std::vector<std::string> suspects;  ///< all that was sought; none: everything
   double left = 0;  ///< RMS in units of the noise, of all signals; 0: no more than noise
-  std::vector<FoundEffect> effects;  ///< by what they do to the contour error
+  std::vector<FoundEffect> effects;     ///< by what they do to the contour error
+  std::vector<FittedNumber> uncertain;  ///< what the declared machine calls so, as fitted along
   std::optional<LearnedLaw> law;
   /// "X vibrates by itself at 83 Hz", "deflection x shifts by 1.2 um from lap to lap": of unknown
   /// cause.

@@ -85,6 +85,7 @@ std::string to_json(const Diagnosis& d, const std::string& source) {
                     {"after", finite(d.chi2.after)},
                     {"noise", finite(d.chi2.noise)}}},
                   {"effects", list(d.effects, effect)},
+                  {"uncertain", list(d.uncertain, number)},
                   {"law", d.law ? learned(*d.law) : Json()},
                   {"vibrations", d.vibrations},
                   {"figures", list(d.figures, figure)},

@@ -90,6 +90,17 @@ std::string effect_box(const FoundEffect& e) {
   return text + "</div>\n";
 }
 
+std::string uncertain_section(const std::vector<FittedNumber>& all) {
+  if (all.empty()) return "";
+  std::string text =
+      "<h2>Declared as uncertain</h2>\n<table><tr><th>number</th><th>value [95 % interval]</th>"
+      "<th>unit</th></tr>\n";
+  for (const FittedNumber& n : all)
+    text += fmt::format("<tr><td><code>{}</code></td><td>{}</td><td>{}</td></tr>\n", escaped(n.key),
+                        with_interval(n), escaped(unit_of_key(n.key)));
+  return text + "</table>\n";
+}
+
 std::string figure_row(const SignalFigure& f) {
   const ShownUnit unit = shown_unit(f.channel);
   return fmt::format(
@@ -222,6 +233,7 @@ std::string diagnosis_page(const DiagnosisStory& story) {
     page += "<h2>What was found</h2>\n";
     for (const FoundEffect& e : d.effects) page += effect_box(e);
   }
+  page += uncertain_section(d.uncertain);
   if (d.law) {
     page +=
         "<h2>A law without a name</h2>\n<p>" + escaped(d.law->words) +

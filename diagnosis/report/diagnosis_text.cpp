@@ -118,6 +118,8 @@ std::string to_text(const Diagnosis& d) {
                                 "`, at another feed or size if this is one, may tell them apart");
     }
   }
+  for (const FittedNumber& n : d.uncertain)
+    text += fmt::format("  declared as uncertain: {} = {}\n", n.key, with_interval(n));
   if (d.law && d.verdict != DiagnosisVerdict::unexplained) text += "  " + d.law->words + "\n";
   text += figures_table(d.figures);
   std::size_t blind = 0;

@@ -369,8 +369,25 @@ std::vector<Contender> Contest::releases(Released which) const {
     c.gain = ground_.held_out - s.held_out;
     c.fit.held_out_of = left_after(ground_.grams.held_out_of, s.step);
     all.push_back(std::move(c));
+    all.back().numbers.front().value = value;
   }
+  refit_released(all);
   return all;
+}
+
+/// A long way off its declaration a number may do better than sensitivities tell.
+void Contest::refit_released(std::vector<Contender>& all) const {
+  rules_.evidence.each_together(all.size(), [&](std::size_t i) {
+    Contender& c = all[i];
+    c.numbers.front().tolerance = 0;
+    Refit fit = refit(rules_.evidence, now_.machine, c.numbers, without(linear_, c.numbers),
+                      {.max_iterations = kGlance});
+    const double gain = ground_.held_out - fit.held_out;
+    if (gain <= c.gain) return;
+    c.gain = gain;
+    c.numbers = fit.live;
+    c.fit = std::move(fit);
+  });
 }
 
 double Contest::needed_of(const Contender& c) const {

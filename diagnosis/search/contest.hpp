@@ -95,6 +95,7 @@ class Contest {
   void begin_elsewhere(Contender& best, const std::vector<Screened>& trials) const;
   enum class Released { where_pulled, anywhere };
   std::vector<Contender> releases(Released which) const;
+  void refit_released(std::vector<Contender>& all) const;
   void look_ahead(const std::vector<Screened>& screened, std::vector<Contender>& all) const;
   void put_simplest_first(std::vector<Contender>& all) const;
   double intricacy(const Contender& contender) const;

@@ -40,6 +40,7 @@ struct DiagnosisOptions {
   double clamped_um = 5;          ///< offset of the piece that is worth a word; 10 urad per um
   /// All that is sought (suspects.hpp); none: everything.
   std::vector<std::string> suspects;
+  Against against = Against::declaration;
   /// Numbers that a healthy run has in common with the one that is explained.
   std::vector<FreedNumber> common;
   /// Axes that vibrate by themselves: what else their drives do is not sought.

@@ -313,8 +313,8 @@ void anchor_at(Evidence& evidence, FittedMachine& m) {
   m.held_out = Ground(evidence, m.residual, m.linear()).held_out;
 }
 
-FittedMachine fit_declared(Evidence& evidence, const Machine& declared) {
-  return fit_numbers(evidence, declared, nuisances(declared));
+FittedMachine fit_declared(Evidence& evidence, const Machine& declared, Against against) {
+  return fit_numbers(evidence, declared, nuisances(declared, against));
 }
 
 FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,

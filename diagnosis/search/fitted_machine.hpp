@@ -87,7 +87,8 @@ struct NoUse {
 void settle_in(Evidence& evidence, FittedMachine& machine, const NoUse& no_use);
 
 /// The declared machine with its nuisances fitted, or with these numbers.
-FittedMachine fit_declared(Evidence& evidence, const Machine& declared);
+FittedMachine fit_declared(Evidence& evidence, const Machine& declared,
+                           Against against = Against::declaration);
 FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
                           std::vector<FreedNumber> numbers);
 

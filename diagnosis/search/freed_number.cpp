@@ -36,7 +36,13 @@ constexpr Tolerance kResidues[] = {
     {"effects.Z.", ".thermal_drift.offset_um", 3},
 };
 
-double tolerance_of(const std::string& key, double value) {
+/// Of a change between two runs, in the unit of the key.
+constexpr Tolerance kChanges[] = {{"effects.probe.tip_radius.", ".larger_um", 0.3}};
+
+double tolerance_of(const std::string& key, double value, Against against) {
+  if (against == Against::healthy_run)
+    for (const Tolerance& t : kChanges)
+      if (key.starts_with(t.prefix) && key.find(t.part) != std::string::npos) return t.size;
   for (const Tolerance& t : kResidues)
     if (key.starts_with(t.prefix) && key.find(t.part) != std::string::npos) return t.size;
   for (const Tolerance& t : kTolerances)
@@ -52,6 +58,19 @@ auto deviation_of(M& machine, const std::string& key)
   for (auto& d : machine.effects.deviations)
     if (d.key == key) return &d;
   return nullptr;
+}
+
+const Uncertainty* uncertainty_of(const Machine& machine, const std::string& key) {
+  for (const Uncertainty& u : machine.uncertainties)
+    if (u.key == key) return &u;
+  return nullptr;
+}
+
+/// A size at which a number shows of which only the bounds are known.
+double typical_within(const Range& range, double value) {
+  constexpr double kOfValue = 0.1, kOfRange = 0.05;
+  const double of_range = kOfRange * (range.max - range.min);
+  return value != 0 ? std::min(kOfValue * std::abs(value), of_range) : of_range;
 }
 
 /// Where a number is said to deviate, it is the deviation that is moved.
@@ -137,19 +156,27 @@ std::string unit_of_key(const std::string& key) {
   return at != units.end() && at->first == key ? at->second : "";
 }
 
-std::vector<FreedNumber> nuisances(const Machine& declared) {
+std::vector<FreedNumber> nuisances(const Machine& declared, Against against) {
   Machine copy = declared;
   std::vector<FreedNumber> all;
   for (const Parameter& p : parameters(copy)) {
     const Deviation* d = deviation_of(declared, p.key);
-    const double value = d ? d->value : p.in_unit(), tolerance = tolerance_of(p.key, value);
-    if (tolerance <= 0) continue;
+    const double value = d ? d->value : p.in_unit();
+    const Uncertainty* told =
+        against == Against::declaration ? uncertainty_of(declared, p.key) : nullptr;
+    const double tolerance = told ? told->standard : tolerance_of(p.key, value, against);
+    const bool free = told && told->free();
+    if (tolerance <= 0 && !free) continue;
     // Counted in what is small, so that differences are taken near the declaration.
     const bool clamped = p.key.starts_with("effects.setup.");
+    const Range range =
+        told && !told->between.empty() ? Range{told->between[0], told->between[1]} : p.range;
     all.push_back({.number = {.key = p.key,
-                              .typical = clamped ? 10 : tolerance,
-                              .min = p.range.min,
-                              .max = p.range.max},
+                              .typical = clamped ? 10
+                                         : free  ? typical_within(range, value)
+                                                 : tolerance,
+                              .min = range.min,
+                              .max = range.max},
                    .value = value,
                    .centre = value,
                    .tolerance = tolerance});

@@ -46,6 +46,9 @@ bool has_key(const std::vector<FreedNumber>& numbers, const std::string& key);
 /// Unit of a key's number: "um" of "gap_um", "" where it has none.
 std::string unit_of_key(const std::string& key);
 
+/// What a machine is held against.
+enum class Against { declaration, healthy_run };
+
 /// Declared numbers that are never exact, with their tolerances (standard deviations):
 ///
 ///   moving mass and inertia                    1 %
@@ -54,12 +57,15 @@ std::string unit_of_key(const std::string& key);
 ///   damping of declared windup                 50 %
 ///   where the piece was clamped                free (100 um, 500 urad); reported above 5 um
 ///   scale of a linear axis                     1.5 ppm
-///   size of gauge and ball                     1 um
+///   size of gauge and ball                     1 um; 0.3 um between two runs: a steel ring of
+///                                              60 mm in diameter grows by that in 1 K
 ///   drift of a linear axis                     3 um with 1200 s: 0.15 um/min
 ///
-/// Only numbers that can show in the run matter; the others stay at their declaration by
-/// themselves.
-std::vector<FreedNumber> nuisances(const Machine& declared);
+/// Against the declaration, those that the machine lists as uncertain are as uncertain as it says:
+/// free, of another tolerance, or exact and no nuisance at all. Of a change between two runs of one
+/// machine that says nothing. Only numbers that can show in the run matter; the others stay at
+/// their declaration by themselves.
+std::vector<FreedNumber> nuisances(const Machine& declared, Against against = Against::declaration);
 
 /// Whether a number of an undeclared effect is among them: where the piece was clamped, drift, ...
 bool never_quite_absent(const std::string& key);

@@ -43,7 +43,7 @@ class Search {
 
   SelectionResult run() {
     go("fitting the declared machine", 0);
-    result_.base = fit_declared(evidence_, declared_);
+    result_.base = fit_declared(evidence_, declared_, options_.against);
     rules_.floor_of = noise_floor(evidence_, result_.base.residual, options_.form_of_channel);
     rules_.floor = result_.floor =
         std::accumulate(rules_.floor_of.begin(), rules_.floor_of.end(), 0.0);
@@ -333,6 +333,7 @@ class Search {
       for (FreedNumber& n : m.nuisances.numbers)
         if (n.number.key == best.released) n.tolerance = 0;
       m.released.push_back({best.released, explained, equivalent});
+      if (!best.fit.live.empty()) move_to(m, best.fit);
       add_common(evidence_, m, options_.common);
       converge(evidence_, m);
       settle_in(evidence_, m, {rules_.floor + options_.least_gain, much});
@@ -352,16 +353,21 @@ class Search {
       if (owner == best.candidate) added.class_with = equivalent;
       m.added.push_back(std::move(added));
     }
-    m.machine = best.fit.machine;
-    m.held_out = best.fit.held_out;
     // Numbers that other ones replace are no nuisances any more; fixed shapes stay as tried.
     m.nuisances = without(m.nuisances, best.numbers);
-    adopt(m.nuisances.numbers, best.fit.linear);
-    for (AddedEffect& a : m.added) adopt(a.numbers, best.fit.linear);
-    evidence_.anchor(m.machine);
+    move_to(m, best.fit);
     add_common(evidence_, m, options_.common);
     converge(evidence_, m);
     settle_in(evidence_, m, {rules_.floor + options_.least_gain, much});
+  }
+
+  void move_to(FittedMachine& m, const Refit& fit) {
+    m.machine = fit.machine;
+    m.held_out = fit.held_out;
+    adopt(m.nuisances.numbers, fit.live);
+    adopt(m.nuisances.numbers, fit.linear);
+    for (AddedEffect& a : m.added) adopt(a.numbers, fit.linear);
+    evidence_.anchor(m.machine);
   }
 
   /// Removes what the others can do without, and says what each one is worth.
@@ -452,7 +458,11 @@ class Search {
         return simpler(r) || r.worth() >= worth;
       });
       if (better != rivals.end()) {
-        const double allowed_loss = simpler(*better) ? contest.band_of(lost) : -options_.least_gain;
+        // What takes the place of a declared number says more, and must do clearly better: else
+        // the number took its place again.
+        const double allowed_loss = simpler(*better) ? contest.band_of(lost)
+                                    : number         ? -contest.band_of(lost)
+                                                     : -options_.least_gain;
         FittedMachine instead = less;
         add(instead, *better, {});
         if (counted(instead, contest) >= counted(m, contest) - allowed_loss) {

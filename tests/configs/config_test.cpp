@@ -189,6 +189,39 @@ TEST(Config, WhatCommissioningLeftIsKept) {
       "m.toml:3: commissioned.left_si: -1 is out of range, allowed 0 .. 1000000");
 }
 
+TEST(Config, WhatIsUncertainIsKept) {
+  const std::string text =
+      "name = \"m\"\n[[uncertainty]]\nkey = \"axes.X.kv_per_s\"\nstandard = 2\n"
+      "between = [20, 60]\n[[uncertainty]]\nkey = \"axes.X.load_kg\"\n";
+  const Machine m = parse_machine(to_toml(parse_machine(text, "m")), "again");
+  ASSERT_EQ(m.uncertainties.size(), 2u);
+  EXPECT_EQ(m.uncertainties[0].standard, 2);
+  EXPECT_EQ(m.uncertainties[0].between, (std::vector<double>{20, 60}));
+  EXPECT_FALSE(m.uncertainties[0].free());
+  EXPECT_TRUE(m.uncertainties[1].exact());
+  EXPECT_EQ(to_toml(Machine()).find("uncertainty"), std::string::npos);
+}
+
+TEST(Config, RefusesUncertaintiesOfWhatThereIsNotAndBoundsWithoutTheValue) {
+  const auto error_with = [](const std::string& lines) {
+    return error_of([&] { parse_machine("name = \"m\"\n[[uncertainty]]\n" + lines, "m.toml"); });
+  };
+  const std::string kv = "key = \"axes.X.kv_per_s\"\n";
+  EXPECT_EQ(error_with("standard = 1\n"), "m.toml: uncertainty: key is missing");
+  EXPECT_EQ(error_with("key = \"axes.X.kv\"\n"),
+            "m.toml: uncertainty: axes.X.kv is not a number of a machine file; did you mean "
+            "axes.X.kv_per_s?");
+  EXPECT_EQ(error_with(kv + "between = [50, 20]\n"),
+            "m.toml: uncertainty: axes.X.kv_per_s: between: expected [least, most]");
+  EXPECT_NE(error_with(kv + "between = [500, 600]\n").find("is declared, which is not between 500"),
+            std::string::npos);
+  EXPECT_NE(error_with(kv + "between = [-5, 600]\n").find("between: allowed "), std::string::npos);
+  EXPECT_EQ(error_with(kv + "[[uncertainty]]\n" + kv),
+            "m.toml: uncertainty: axes.X.kv_per_s is given twice");
+  EXPECT_EQ(error_with(kv + "standard = -1\n").find("m.toml:4: uncertainty.standard: -1 is out of"),
+            0u);
+}
+
 TEST(Config, MessagesNameFileAndLine) {
   EXPECT_EQ(error_of([] { parse_machine("name = \"a\"\n[axes.X]\nkv = 3\n", "m.toml"); }),
             "m.toml:3: axes.X.kv: unknown key; did you mean kv_per_s?");

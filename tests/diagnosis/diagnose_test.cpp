@@ -312,6 +312,39 @@ TEST(Diagnose, AMassWithinItsToleranceIsNoFinding) {
 }
 
 /// Dry friction of 0.15 N under a noise of 2 N: significant over 12 s, and nothing to be told.
+TEST(Diagnose, AnUncertainNumberIsFittedAndIsNoFinding) {
+  const Record record = measured(toy::machine({{"effects.X.coulomb.level_N", 40}}), 11);
+  Machine declared;
+  EXPECT_EQ(diagnosed(record, declared).verdict, DiagnosisVerdict::explained);
+  declared.uncertainties = {{"effects.X.coulomb.level_N", 0, {0, 100}},
+                            {"axes.Z.kv_per_s", 0, {10, 100}}};
+  const Diagnosis d = diagnosed(record, declared);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::no_deviation) << to_text(d);
+  ASSERT_EQ(d.uncertain.size(), 1U);
+  EXPECT_EQ(d.uncertain[0].key, "effects.X.coulomb.level_N");
+  EXPECT_LT(d.uncertain[0].low, 40);
+  EXPECT_GT(d.uncertain[0].high, 40);
+  EXPECT_LT(d.uncertain[0].high - d.uncertain[0].low, 2);
+  EXPECT_EQ(number_of(d.found, "effects.X.coulomb.level_N"), d.uncertain[0].value);
+  EXPECT_NE(to_text(d).find("axes.Z.kv_per_s is declared as uncertain, and this run does not"),
+            std::string::npos);
+  declared.uncertainties[0].between = {0, 30};  // what is out of bounds is one
+  const Diagnosis bounded = diagnosed(record, declared);
+  EXPECT_NE(bounded.verdict, DiagnosisVerdict::no_deviation) << to_text(bounded);
+}
+
+TEST(Diagnose, AMassThatIsKnownExactlyIsFoundWithinItsUsualTolerance) {
+  const Record record = measured(toy::machine({{"axes.X.load_kg", 505}}), 12);
+  Machine declared = toy::machine({{"axes.X.load_kg", 500}});
+  EXPECT_EQ(diagnosed(record, declared).verdict, DiagnosisVerdict::no_deviation);
+  declared.uncertainties = {{"axes.X.load_kg", 0.1, {}}};
+  const Diagnosis d = diagnosed(record, declared);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::explained) << to_text(d);
+  ASSERT_EQ(d.effects.size(), 1U);
+  EXPECT_EQ(d.effects[0].place, "axes.X.load_kg");
+  EXPECT_NEAR(d.effects[0].numbers[0].value, 505, 1);
+}
+
 TEST(Diagnose, NotesWhatIsOfNoConsequence) {
   Record record = toy::commands(1000, 8);
   toy::measure(record, toy::machine({{"effects.X.coulomb.level_N", 0.15}}), 31);

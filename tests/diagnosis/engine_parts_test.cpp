@@ -775,6 +775,47 @@ TEST(Intervals, KnowThatLapsAreNotAlike) {
   EXPECT_NEAR(widths / numbers, 2.2 * 0.5 / std::sqrt(6), 0.15);
 }
 
+const FreedNumber* number_among(const std::vector<FreedNumber>& all, const std::string& key) {
+  for (const FreedNumber& n : all)
+    if (n.number.key == key) return &n;
+  return nullptr;
+}
+
+TEST(Nuisances, AreAsUncertainAsTheMachineSays) {
+  Machine machine;
+  machine.axes[kX].servo.kv_per_s = 40;
+  machine.uncertainties = {{"axes.X.load_kg", 0, {}},
+                           {"axes.X.kv_per_s", 0, {20, 60}},
+                           {"axes.Y.load_kg", 12, {300, 900}},
+                           {"effects.X.backlash.gap_um", 0, {0, 30}}};
+  const std::vector<FreedNumber> all = nuisances(machine);
+  EXPECT_EQ(number_among(all, "axes.X.load_kg"), nullptr);  // known exactly
+  const FreedNumber *kv = number_among(all, "axes.X.kv_per_s"),
+                    *mass = number_among(all, "axes.Y.load_kg"),
+                    *gap = number_among(all, "effects.X.backlash.gap_um");
+  ASSERT_TRUE(kv && mass && gap);
+  EXPECT_EQ(kv->precision(), 0);
+  EXPECT_EQ(kv->number.min, 20);
+  EXPECT_EQ(kv->number.max, 60);
+  EXPECT_NEAR(kv->number.typical, 2, 1e-12);  // the least of a tenth of 40 and a twentieth of 40
+  EXPECT_EQ(mass->tolerance, 12);
+  EXPECT_EQ(mass->number.max, 900);
+  EXPECT_DOUBLE_EQ(gap->number.typical, 1.5);
+  // Of a change between two runs that says nothing.
+  const std::vector<FreedNumber> change = nuisances(machine, Against::healthy_run);
+  EXPECT_NE(number_among(change, "axes.X.load_kg"), nullptr);
+  EXPECT_EQ(number_among(change, "axes.X.kv_per_s"), nullptr);
+}
+
+/// Neither ball nor ring is another one: it is warmer at most.
+TEST(Nuisances, BallAndGaugeHardlyChangeBetweenTwoRuns) {
+  const std::string key = "effects.probe.tip_radius.larger_um";
+  const std::vector<FreedNumber> of_declaration = nuisances({}),
+                                 of_change = nuisances({}, Against::healthy_run);
+  EXPECT_EQ(number_among(of_declaration, key)->tolerance, 1);
+  EXPECT_EQ(number_among(of_change, key)->tolerance, 0.3);
+}
+
 TEST(FreedNumber, OfWhatDeviatesIsTheTrueValue) {
   Machine machine;
   const std::string key = "axes.X.load_kg";
