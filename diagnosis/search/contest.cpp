@@ -16,16 +16,18 @@
 namespace vcnc {
 namespace {
 
-constexpr double kHopeless = 100;  ///< times what is to be explained: a loop that is unstable
-constexpr int kGlance = 4;         ///< iterations to see what a candidate is worth
-constexpr double kUsual = 1;       ///< decades about the typical size
-constexpr double kShows = 0.02;    ///< part of a gain that a channel must have to be concerned
-constexpr double kChance = 3;      ///< standard deviations of a sum of squares
-constexpr double kNothing = 0.03;  ///< of a typical size
-constexpr double kPromise = 0.3;   ///< of what is needed: worth a refit
-constexpr double kHope = 0.5;      ///< of what is needed: worth to be refitted to the end
-constexpr double kLeaves = 0.05;   ///< part of what is left that a winner may leave
-constexpr double kNearly = 0.99;   ///< part of a gain that may be as much when all is refitted
+constexpr double kHopeless = 100;   ///< times what is to be explained: a loop that is unstable
+constexpr int kGlance = 4;          ///< iterations to see what a candidate is worth
+constexpr double kUsual = 1;        ///< decades about the typical size
+constexpr double kShows = 0.02;     ///< part of a gain that a channel must have to be concerned
+constexpr double kChance = 3;       ///< standard deviations of a sum of squares
+constexpr double kNothing = 0.03;   ///< of a typical size
+constexpr double kPromise = 0.3;    ///< of what is needed: worth a refit
+constexpr double kHope = 0.5;       ///< of what is needed: worth to be refitted to the end
+constexpr double kLeaves = 0.05;    ///< part of what is left that a winner may leave
+constexpr double kNearly = 0.99;    ///< part of a gain that may be as much when all is refitted
+constexpr double kWorthAFit = 0.5;  ///< of another gain, that sensitivities must promise
+constexpr double kLongWay = 9;      ///< tolerances, where sensitivities are others
 constexpr std::size_t kElsewhere = 2;
 constexpr std::size_t kFinalists = 3, kRivals = 4, kMoreRefits = 8;
 
@@ -104,7 +106,8 @@ std::vector<Contender> Contest::contenders() {
     std::move(others.begin(), others.end(), std::back_inserter(all));
     finish(all);
   }
-  for (Contender& c : releases(Released::where_pulled)) all.push_back(std::move(c));
+  const double best = all.empty() ? 0 : all.front().gain;
+  for (Contender& c : releases(Released::where_pulled, best)) all.push_back(std::move(c));
   for (Contender& c : all) {
     c.needed = needed_of(c);
     c.counts = counts(c.gain, c.fit.held_out_of);
@@ -131,7 +134,7 @@ std::vector<Contender> Contest::rivals(double least, std::size_t but) const {
   list.resize(few);
   std::vector<Contender> all = refitted(list);
   finish(all);
-  for (Contender& c : releases(Released::anywhere))
+  for (Contender& c : releases(Released::anywhere, least))
     if (c.gain >= least) all.push_back(std::move(c));
   for (Contender& c : all) c.counts = counts(c.gain, c.fit.held_out_of);
   sort_by_worth(all);
@@ -345,8 +348,9 @@ void Contest::begin_elsewhere(Contender& best, const std::vector<Screened>& tria
 }
 
 /// A declared number whose tolerance is lifted competes with the effects: one that pulls at it, or,
-/// where something was taken out that may have stood for it, any that then leaves it.
-std::vector<Contender> Contest::releases(Released which) const {
+/// where something was taken out that may have stood for it, any that then leaves it. Those that
+/// may gain as much as another one are refitted.
+std::vector<Contender> Contest::releases(Released which, double as_much) const {
   std::vector<Contender> all;
   for (std::size_t i = 0; i < now_.nuisances.numbers.size(); ++i) {
     const FreedNumber& n = now_.nuisances.numbers[i];
@@ -371,14 +375,16 @@ std::vector<Contender> Contest::releases(Released which) const {
     all.push_back(std::move(c));
     all.back().numbers.front().value = value;
   }
-  refit_released(all);
+  refit_released(all, kWorthAFit * as_much);
   return all;
 }
 
 /// A long way off its declaration a number may do better than sensitivities tell.
-void Contest::refit_released(std::vector<Contender>& all) const {
+void Contest::refit_released(std::vector<Contender>& all, double least) const {
   rules_.evidence.each_together(all.size(), [&](std::size_t i) {
     Contender& c = all[i];
+    const FreedNumber& n = c.numbers.front();
+    if (c.gain < least || std::abs(n.value - n.centre) < kLongWay * n.tolerance) return;
     c.numbers.front().tolerance = 0;
     Refit fit = refit(rules_.evidence, now_.machine, c.numbers, without(linear_, c.numbers),
                       {.max_iterations = kGlance});

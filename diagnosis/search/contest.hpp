@@ -94,8 +94,8 @@ class Contest {
   void finish(std::vector<Contender>& all) const;
   void begin_elsewhere(Contender& best, const std::vector<Screened>& trials) const;
   enum class Released { where_pulled, anywhere };
-  std::vector<Contender> releases(Released which) const;
-  void refit_released(std::vector<Contender>& all) const;
+  std::vector<Contender> releases(Released which, double as_much) const;
+  void refit_released(std::vector<Contender>& all, double least) const;
   void look_ahead(const std::vector<Screened>& screened, std::vector<Contender>& all) const;
   void put_simplest_first(std::vector<Contender>& all) const;
   double intricacy(const Contender& contender) const;
