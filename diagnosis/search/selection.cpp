@@ -361,6 +361,7 @@ class Search {
     settle_in(evidence_, m, {rules_.floor + options_.least_gain, much});
   }
 
+  /// Takes over where a contender was fitted to.
   void move_to(FittedMachine& m, const Refit& fit) {
     m.machine = fit.machine;
     m.held_out = fit.held_out;
