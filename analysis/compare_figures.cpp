@@ -18,13 +18,13 @@ Envelope envelope_of(const Curve& curve, double length) {
   return e;
 }
 
-double reach(const Envelope& e) {
+double most_of(const Envelope& e) {
   double most = 0;
   for (const Envelope::Point& p : e.points()) most = std::max(most, std::abs(p.y));
   return most;
 }
 
-std::string y_range(double most) {
+std::string range_to(double most) {
   const double r = std::max(most, 0.05);
   return fmt::format("set yrange [{:.6g}:{:.6g}]\n", -1.15 * r, 1.35 * r);
 }
@@ -40,13 +40,13 @@ std::string compared_error_figure(const Comparison& c) {
   std::string text =
       heading(900, both ? 520 : 300) + block("a", a, 1e3, 1e6) + block("b", b, 1e3, 1e6);
   text += fmt::format("set multiplot\nset xrange [0:{:.6g}]\n", length * 1e3);
-  text += margins(both ? 0.53 : 0.17, 0.95) + y_range(std::max(reach(a), reach(b)) * 1e6) +
+  text += margins(both ? 0.53 : 0.17, 0.95) + range_to(std::max(most_of(a), most_of(b)) * 1e6) +
           "set ylabel 'e_n  [µm]' offset 0.5\n";
   text += both ? "set format x ''\n" : "set xlabel 'station on the path  s  [mm]'\n";
   text += "plot " + line("a", "A", kInk, 1.3) + ", " + line("b", "B", kOrange, 1.3) + "\n";
   if (both) {
     const Envelope d = envelope_of(c.e_n_difference, length);
-    text += block("d", d, 1e3, 1e6) + margins(0.14, 0.48) + y_range(reach(d) * 1e6) +
+    text += block("d", d, 1e3, 1e6) + margins(0.14, 0.48) + range_to(most_of(d) * 1e6) +
             "set format x '%g'\nset xlabel 'station on the path  s  [mm]'\n"
             "set ylabel 'difference  [µm]' offset 0.5\nplot " +
             line("d", "e_n of B - e_n of A", kGreen, 1.3) + "\n";
@@ -66,7 +66,7 @@ std::string compared_following_figure(const Comparison& c) {
     const std::string a = fmt::format("a{}", j), b = fmt::format("b{}", j);
     text += block(a, c.a.following[j], 1, scale) + block(b, c.b.following[j], 1, scale) +
             margins(top - 0.88 * kHeight, top) +
-            y_range(std::max(reach(c.a.following[j]), reach(c.b.following[j])) * scale) +
+            range_to(std::max(most_of(c.a.following[j]), most_of(c.b.following[j])) * scale) +
             fmt::format("set ylabel '{} [{}]' offset 0.5\nset ytics autofreq nomirror\n",
                         kAxisNames[j], is_rotary(j) ? "arcsec" : "µm");
     text +=

@@ -35,7 +35,7 @@ std::string run_box(const char* letter, const char* colour, const ComparedRun& r
       to_string(s.verdict), escaped(s.verdict_reason));
 }
 
-std::string error_table(const Comparison& c) {
+std::string errors_side_by_side(const Comparison& c) {
   std::string text =
       "<table><tr><th>error [µm]</th><th></th><th>max</th><th>min</th><th>mean</th><th>rms</th>"
       "<th>p-p</th></tr>\n";
@@ -61,7 +61,7 @@ std::string error_table(const Comparison& c) {
   return text + "</table>\n";
 }
 
-std::string axis_table(const Comparison& c) {
+std::string axes_side_by_side(const Comparison& c) {
   std::string text =
       "<table><tr><th>axis</th><th>unit</th><th>max A</th><th>max B</th><th>B − A</th>"
       "<th>rms A</th><th>rms B</th><th>B − A</th></tr>\n";
@@ -120,11 +120,11 @@ std::string compare_page(const Comparison& c) {
                                  "difference."
                                : "e<sub>n</sub> of each run over its own station, mean in bins of "
                                  "0.25 mm.");
-  if (a && b) page += error_table(c);
+  if (a && b) page += errors_side_by_side(c);
   page += "<h2>Following error</h2>\n" +
           figure(compared_following_figure(c),
                  "Measured minus commanded axis positions of both runs over time.") +
-          axis_table(c);
+          axes_side_by_side(c);
   page += "<h2>Declared machine</h2>\n";
   page += c.machine.empty() ? "<p>Equal.</p>\n" : key_table(c.machine);
   if (!c.piece.empty()) page += "<h2>Piece</h2>\n" + key_table(c.piece);

@@ -11,7 +11,7 @@ constexpr double kEntryTravel = 0.5e-3, kEntryBand = 2e-6;   ///< [m]
 constexpr double kExitBand = 50e-6;                          ///< [m]
 constexpr double kExitSlope = 0.05, kSlopeTravel = 0.25e-3;  ///< drift of D per travel
 constexpr double kPassBand = 3e-6, kPassTravel = 20e-3;      ///< [m]; a later pass is so far behind
-constexpr double kStandStill = 1e-9;                         ///< travel of a cycle at rest [m]
+constexpr double kNoTravel = 1e-9;                           ///< travel of a cycle at rest [m]
 constexpr double kAdvance = 0.5;   ///< least share of the travel that must advance the station
 constexpr double kOffLine = 1e-3;  ///< a line farther away is not the one followed [m]
 
@@ -102,7 +102,7 @@ LapTracker::Place LapTracker::track(const ErrorSample& sample) {
     travelled_ += sample.travel;
     place.s = travelled_;
     place.direction = 1;
-    place.on_path = sample.travel > kStandStill;
+    place.on_path = sample.travel > kNoTravel;
     return place;
   }
   const double from = projection_.s;
@@ -118,7 +118,7 @@ LapTracker::Place LapTracker::track(const ErrorSample& sample) {
   place.from = gap ? place.s : from;
   place.direction = step > 0 ? 1 : -1;
   place.face = line_->face(projection_.segment);
-  place.on_path = sample.travel > kStandStill && std::abs(step) > kAdvance * sample.travel;
+  place.on_path = sample.travel > kNoTravel && std::abs(step) > kAdvance * sample.travel;
   return place;
 }
 

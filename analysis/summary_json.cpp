@@ -50,7 +50,7 @@ Json axes(const Summary& s) {
   return all;
 }
 
-Json coverage(const Summary& s) {
+Json coverage_json(const Summary& s) {
   return {{"percent", s.coverage_percent},
           {"bins", std::ssize(s.bins)},
           {"bins_ok", s.count(Coverage::Bin::ok)},
@@ -63,7 +63,7 @@ Json coverage(const Summary& s) {
           {"height_mm", s.line_z * 1e3}};
 }
 
-Json circles(const Summary& s) {
+Json circles_json(const Summary& s) {
   Json list = Json::array();
   for (const auto& [direction, r] : s.circles) {
     Json steps = Json::array();
@@ -125,13 +125,13 @@ std::string to_json(const Summary& s) {
                   {"e_plan_um", error_statistics(whole.e_plan)},
                   {"e_servo_um", error_statistics(whole.e_servo)},
                   {"e_rest_um", error_statistics(whole.e_rest)},
-                  {"coverage", coverage(s)},
+                  {"coverage_json", coverage_json(s)},
                   {"following_error", axes(s)},
                   {"lag_um", error_statistics(s.lag)},
                   {"cross_um", error_statistics(s.cross)},
                   {"parts", groups(s)},
                   {"crossings", crossings(s)},
-                  {"circles", circles(s)},
+                  {"circles_json", circles_json(s)},
                   {"alarms", alarms(s)},
                   {"warnings", s.warnings}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -15,8 +15,8 @@ namespace vcnc {
 
 namespace {
 
-using Kind = Scenario::Kind;
-using Target = Scenario::Target;
+using CaseKind = Scenario::Kind;
+using CaseTarget = Scenario::Target;
 
 /// Unit vector in the direction `polar` away from `axis`, turned by `azimuth` about it.
 Vec3 tilted(const Vec3& axis, double polar, double azimuth) {
@@ -49,13 +49,13 @@ class Builder {
 
   LockoutCase build() {
     switch (s_.kind) {
-      case Kind::program:
+      case CaseKind::program:
         own_program();
         break;
-      case Kind::rotary:
+      case CaseKind::rotary:
         swing();
         break;
-      case Kind::scan:
+      case CaseKind::scan:
         scan();
         break;
       default:
@@ -88,7 +88,7 @@ class Builder {
   Meeting meet() {
     const Kinematics k = kinematics();
     Meeting m;
-    if (s_.target == Target::piece) {
+    if (s_.target == CaseTarget::piece) {
       result_.piece = machines_piece();
       const auto piece = make_piece(*result_.piece);
       const double height = 0.02;
@@ -116,12 +116,12 @@ class Builder {
     PieceParams piece;
     piece.name = "target";
     switch (s_.target) {
-      case Target::sphere:
+      case CaseTarget::sphere:
         piece.kind = PieceParams::Kind::sphere;
         piece.radius = s_.radius;
         piece.centre = m.touch - (ball + s_.radius) * m.normal;
         break;
-      case Target::bore:
+      case CaseTarget::bore:
         piece.kind = PieceParams::Kind::ring;
         piece.bore = true;
         piece.radius = s_.radius;
@@ -163,12 +163,12 @@ class Builder {
     const Meeting m = meet();
     Vec3 believed = Vec3::Zero();  ///< programmed minus real position
     const double error = s_.depth - machine().setup.predeflection;
-    if (s_.kind == Kind::wrong_offset) {
+    if (s_.kind == CaseKind::wrong_offset) {
       believed = -error * m.way;
       const Vec3 real = machine().setup.work_offset[0] - error * m.way;
       for (Eigen::Index i = 0; i < 3; ++i)
         deviate(std::string("setup.g54_mm.") + "xyz"[i], real[i] * 1e3);
-    } else if (s_.kind == Kind::wrong_length) {
+    } else if (s_.kind == CaseKind::wrong_length) {
       believed = -error * m.way;
       deviate("probe.length_mm", (machine().probe.length + error) * 1e3);
     }
@@ -177,11 +177,11 @@ class Builder {
     start_at(start, m.at);
     std::string& text = result_.program;
     text = "G90 G21 G54\nG43.4 H1\n";
-    if (s_.kind == Kind::spindle_start) text += "S1000 M3\n";
+    if (s_.kind == CaseKind::spindle_start) text += "S1000 M3\n";
     if (s_.predeflection > 0)
       text +=
           "G1 " + words(m.touch + s_.predeflection * m.way + believed) + feed() + "\nG4 P0.05\n";
-    if (s_.kind == Kind::not_retracted) {
+    if (s_.kind == CaseKind::not_retracted) {
       text += "G0 " + words(end) + "\n";
     } else {
       text += "G1 " + words(end);
@@ -217,7 +217,7 @@ class Builder {
     const Vec3 n = m.normal;
     const Vec3 before = m.touch + s_.run_up * n, in = m.touch - s_.predeflection * n;
     Vec3 along = n.unitOrthogonal();
-    if (s_.target == Target::bore) along = result_.piece->direction;
+    if (s_.target == CaseTarget::bore) along = result_.piece->direction;
     const Vec3 beside = in + s_.sideways * along;
     start_at(before, m.at);
     std::string& text = result_.program;

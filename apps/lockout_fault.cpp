@@ -19,7 +19,7 @@ using State = OvertravelState::State;
 /// The run ends when the measured axes are slower than 1 um per cycle; the true ones are near.
 constexpr double kRest = 2e-6, kRestRotary = 2e-5;
 constexpr Tick kRunDown = 10;  ///< cycles after the end: silence found out, and a standing brake
-constexpr Tick kChain = 2;     ///< sample k, judged k+1, acts k+2 (apps/lockout_trip.hpp)
+constexpr Tick kDetectionChain = 2;  ///< sample k, judged k+1, acts k+2 (apps/lockout_trip.hpp)
 /// A reading that jumps further than this in a cycle is found out (model/safety/protection.hpp).
 constexpr double kCountable = 5;
 
@@ -100,7 +100,7 @@ class FaultJudge {
     if (!f_.countable && !case_.within_limit) return;  // the sensor cannot know
     const Tick out =
         first([&](const TripCycle& c) { return range_.share(c.deflection.back()) > margin; });
-    const Tick due = out + kChain + kFaultDelay;
+    const Tick due = out + kDetectionChain + kFaultDelay;
     const Tick action = braking();
     if (out < 0 || due >= size() || (action >= 0 && action <= due)) return;
     say(fmt::format("out of range in the sample of cycle {}, but {}", out,

@@ -214,17 +214,17 @@ std::string example(const LockoutResults& r, const Example& e) {
 
 /// Runs with a fault, by kind: how they ended.
 std::string fault_table(const LockoutResults& r) {
-  struct Row {
+  struct FaultRow {
     std::size_t runs = 0, unsafe = 0, borne = 0, soft = 0, quick = 0;
     double deepest = 0;  ///< share of the limit, where the feed check covers the way
   };
-  std::map<std::string_view, Row> rows;
+  std::map<std::string_view, FaultRow> rows;
   for (const LockoutVerdict& v : r.verdicts) {
     if (v.faults.empty() || v.process) continue;
     const BusFault fault = parse_fault(v.faults.front());
     const auto kind = std::find_if(fault_kinds().begin(), fault_kinds().end(),
                                    [&](const FaultKind& k) { return k.kind == fault.kind; });
-    Row& row = rows[kind->name];
+    FaultRow& row = rows[kind->name];
     ++row.runs;
     row.unsafe += !v.passed();
     row.borne += v.end.complete;

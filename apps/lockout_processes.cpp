@@ -46,7 +46,7 @@ struct Planned {
   const char* phase = "";  ///< in which the fault is meant to fall
 };
 
-std::string text_of_file(const fs::path& path) {
+std::string whole_text(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
@@ -58,7 +58,7 @@ std::vector<pid_t> processes_of(const std::string& folder) {
   for (const auto& entry : fs::directory_iterator("/proc", error)) {
     const std::string name = entry.path().filename();
     if (name.find_first_not_of("0123456789") != std::string::npos) continue;
-    if (text_of_file(entry.path() / "cmdline").find(folder) == std::string::npos) continue;
+    if (whole_text(entry.path() / "cmdline").find(folder) == std::string::npos) continue;
     if (std::stol(name) != ::getpid()) found.push_back(static_cast<pid_t>(std::stol(name)));
   }
   return found;
@@ -140,7 +140,7 @@ class ProcessRun {
     code_ = await(pid);
     verdict_.process->seconds = clock.elapsed();
     verdict_.process->exit_code = code_;
-    said_ = text_of_file(folder / "stderr");
+    said_ = whole_text(folder / "stderr");
     leftovers(folder);
     verdict_.process->struck = said_.find("had no effect") == std::string::npos;
     judge_code();
@@ -258,7 +258,7 @@ class ProcessRun {
         return;
       }
       if (recording.end().trace_hash == hash_) return;  // the run was over when the fault came
-      came_to_rest(recording, text_of_file(out / "notes.txt"));
+      came_to_rest(recording, whole_text(out / "notes.txt"));
     } catch (const std::exception& e) {
       say(std::string("the recording does not open: ") + e.what());
     }

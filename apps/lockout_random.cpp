@@ -14,16 +14,16 @@ namespace vcnc {
 
 namespace {
 
-using Kind = Scenario::Kind;
-using Target = Scenario::Target;
+using CaseKind = Scenario::Kind;
+using CaseTarget = Scenario::Target;
 using Expect = Scenario::Expect;
 
 /// Rounded to what a file shows, so that a scenario and its file are the same.
 double rounded(double v, double step) { return std::round(v / step) * step; }
 
-class Draw {
+class CaseDraw {
  public:
-  Draw(std::uint64_t seed, std::uint64_t stream, std::uint64_t number)
+  CaseDraw(std::uint64_t seed, std::uint64_t stream, std::uint64_t number)
       : seed_(seed), stream_(stream), counter_(number << 8) {}
 
   double unit() { return uniform_noise(seed_, stream_, counter_++); }
@@ -42,7 +42,7 @@ constexpr std::uint64_t kCrashStream = 0x6c6f636b0001, kOrdinaryStream = 0x6c6f6
                         kFaultedStream = 0x6c6f636b0003;
 
 /// What the probe and the axes are like, and where the ball is.
-ProbeParams draw_machine(Draw& draw, const std::vector<std::string>& machines, Scenario& s) {
+ProbeParams draw_machine(CaseDraw& draw, const std::vector<std::string>& machines, Scenario& s) {
   s.machine = machines[draw.index(machines.size())];
   s.seed = 1 + static_cast<int>(draw.index(1'000'000'000));
   const auto set = [&](const char* key, double value, double step) {
@@ -70,34 +70,35 @@ ProbeParams draw_machine(Draw& draw, const std::vector<std::string>& machines, S
   return load_machine(s.machine, s.set).probe;
 }
 
-void draw_target(Draw& draw, Scenario& s) {
+void draw_target(CaseDraw& draw, Scenario& s) {
   const double which = draw.unit();
-  s.target = which < 0.55   ? Target::plane
-             : which < 0.7  ? Target::sphere
-             : which < 0.85 ? Target::bore
-                            : Target::piece;
+  s.target = which < 0.55   ? CaseTarget::plane
+             : which < 0.7  ? CaseTarget::sphere
+             : which < 0.85 ? CaseTarget::bore
+                            : CaseTarget::piece;
   s.radius = rounded(draw.log_between(15e-3, 100e-3), 1e-6);
   s.station = rounded(draw.unit(), 1e-6);
 }
 
 /// The way to a feed under the acceleration and jerk of a usual machine, and a little more.
-double run_up(Draw& draw, double feed) {
+double run_up(CaseDraw& draw, double feed) {
   const double a = 1, j = 50;
   return rounded(
       std::min(feed * feed / (2 * a) + feed * a / (2 * j), 40e-3) + draw.log_between(0.2e-3, 2e-3),
       1e-6);
 }
 
-Kind draw_kind(Draw& draw) {
-  constexpr std::pair<Kind, double> kShares[] = {
-      {Kind::program_error, 0.34}, {Kind::wrong_offset, 0.26}, {Kind::wrong_length, 0.16},
-      {Kind::not_retracted, 0.12}, {Kind::rotary, 0.08},       {Kind::spindle_start, 0.04}};
+CaseKind draw_kind(CaseDraw& draw) {
+  constexpr std::pair<CaseKind, double> kShares[] = {
+      {CaseKind::program_error, 0.34}, {CaseKind::wrong_offset, 0.26},
+      {CaseKind::wrong_length, 0.16},  {CaseKind::not_retracted, 0.12},
+      {CaseKind::rotary, 0.08},        {CaseKind::spindle_start, 0.04}};
   double u = draw.unit();
   for (const auto& [kind, share] : kShares) {
     if (u < share) return kind;
     u -= share;
   }
-  return Kind::program_error;
+  return CaseKind::program_error;
 }
 
 }  // namespace
@@ -115,7 +116,7 @@ Scenario ScenarioDraw::crash(std::uint64_t number) const {
 Scenario ScenarioDraw::faulted(std::uint64_t number) const {
   Scenario s = crash(kFaultedStream, number, Feed::usual);
   const double range = load_machine(s.machine, s.set).probe.range;
-  const double speed = s.kind == Kind::rotary ? 20e-3 : s.feed;
+  const double speed = s.kind == CaseKind::rotary ? 20e-3 : s.feed;
   const auto cycles = [](double t) { return static_cast<Tick>(std::ceil(t / kCycle)); };
   constexpr Tick kBefore = 50;
   BusFault fault = FaultDraw(seed_).in_turn(number, -kBefore, cycles(range / speed));
@@ -127,13 +128,13 @@ Scenario ScenarioDraw::faulted(std::uint64_t number) const {
 }
 
 Scenario ScenarioDraw::crash(std::uint64_t stream, std::uint64_t number, Feed feed) const {
-  Draw draw(seed_, stream, number);
+  CaseDraw draw(seed_, stream, number);
   Scenario s;
   s.kind = draw_kind(draw);
   s.name = fmt::format("{} {}", to_string(s.kind), number);
   const ProbeParams probe = draw_machine(draw, machines_, s);
   draw_target(draw, s);
-  if (feed == Feed::usual && s.kind == Kind::spindle_start) s.kind = Kind::program_error;
+  if (feed == Feed::usual && s.kind == CaseKind::spindle_start) s.kind = CaseKind::program_error;
   const double most = draw.chance(0.35) ? (feed == Feed::usual ? 4000 : 20000)
                                         : (feed == Feed::usual ? 1500 : 5000);  // [mm/min]
   s.feed = rounded(draw.log_between(300, most), 0.1) * 1e-3 / 60;
@@ -148,46 +149,47 @@ Scenario ScenarioDraw::crash(std::uint64_t stream, std::uint64_t number, Feed fe
     default:
       s.axial_angle = rounded(draw.between(0, 90), 0.01) * kDegree;
   }
-  if (s.kind == Kind::wrong_length) {
+  if (s.kind == CaseKind::wrong_length) {
     s.axial_angle = kPi / 2;
-    if (s.target == Target::piece) s.target = Target::plane;
+    if (s.target == CaseTarget::piece) s.target = CaseTarget::plane;
   }
-  if (s.kind == Kind::rotary || s.kind == Kind::wrong_length || s.kind == Kind::spindle_start)
-    s.target = s.target == Target::piece ? Target::plane : s.target;
-  if (s.target == Target::plane && draw.chance(0.5)) {
+  if (s.kind == CaseKind::rotary || s.kind == CaseKind::wrong_length ||
+      s.kind == CaseKind::spindle_start)
+    s.target = s.target == CaseTarget::piece ? CaseTarget::plane : s.target;
+  if (s.target == CaseTarget::plane && draw.chance(0.5)) {
     s.incidence = rounded(draw.between(0, 55), 0.01) * kDegree;
     s.incidence_azimuth = rounded(draw.between(0, 360), 0.01) * kDegree;
   }
-  if (s.kind != Kind::wrong_length && s.kind != Kind::rotary && draw.chance(0.2))
+  if (s.kind != CaseKind::wrong_length && s.kind != CaseKind::rotary && draw.chance(0.2))
     s.turn = rounded(draw.between(-10, 10), 0.01) * kDegree;
-  if (s.target == Target::piece) s.turn = 0;
+  if (s.target == CaseTarget::piece) s.turn = 0;
 
   // Deep enough to leave the range whatever its shape, the surface and the way are like.
   const UsableRange range = usable_range(probe);
   const double widest = std::max(range.positive.maxCoeff(), range.negative.maxCoeff());
   const double needed = 1.25 * widest * std::sqrt(3.0) / std::cos(s.incidence);
   s.depth = rounded(needed + draw.log_between(2e-3, 20e-3), 1e-6);
-  s.run_up = run_up(draw, s.kind == Kind::rotary ? 20e-3 : s.feed);
+  s.run_up = run_up(draw, s.kind == CaseKind::rotary ? 20e-3 : s.feed);
   // The way begins in the free: within the bore, not across the piece.
-  if (s.target == Target::bore)
+  if (s.target == CaseTarget::bore)
     s.run_up = std::min(s.run_up, rounded(1.6 * (s.radius - probe.ball_radius), 1e-6));
-  if (s.target == Target::piece) s.run_up = std::min(s.run_up, 8e-3);
-  if (draw.chance(0.25) && s.kind != Kind::not_retracted && s.kind != Kind::rotary)
+  if (s.target == CaseTarget::piece) s.run_up = std::min(s.run_up, 8e-3);
+  if (draw.chance(0.25) && s.kind != CaseKind::not_retracted && s.kind != CaseKind::rotary)
     s.predeflection = rounded(draw.between(0.1, 0.5) * std::cos(s.incidence) * probe.range, 1e-6);
   const bool fast = s.feed > 1500e-3 / 60;
   // A swing may be refused, too: its lever is drawn.
-  s.expect = s.kind == Kind::spindle_start   ? Expect::refused
-             : s.kind == Kind::rotary        ? Expect::safe
-             : s.kind == Kind::not_retracted ? Expect::trip
-             : fast                          ? Expect::safe
-                                             : Expect::trip;
+  s.expect = s.kind == CaseKind::spindle_start   ? Expect::refused
+             : s.kind == CaseKind::rotary        ? Expect::safe
+             : s.kind == CaseKind::not_retracted ? Expect::trip
+             : fast                              ? Expect::safe
+                                                 : Expect::trip;
   return s;
 }
 
 Scenario ScenarioDraw::ordinary(std::uint64_t number) const {
-  Draw draw(seed_, kOrdinaryStream, number);
+  CaseDraw draw(seed_, kOrdinaryStream, number);
   Scenario s;
-  s.kind = Kind::scan;
+  s.kind = CaseKind::scan;
   s.expect = Expect::none;
   s.name = fmt::format("scan {}", number);
   const ProbeParams probe = draw_machine(draw, machines_, s);
@@ -199,7 +201,7 @@ Scenario ScenarioDraw::ordinary(std::uint64_t number) const {
   const double narrowest = std::min(range.positive.minCoeff(), range.negative.minCoeff());
   s.predeflection = rounded(draw.between(0.1, 0.6) * narrowest, 1e-6);
   s.sideways = rounded(draw.between(0.5e-3, 4e-3), 1e-6);
-  if (s.target == Target::plane && draw.chance(0.3))
+  if (s.target == CaseTarget::plane && draw.chance(0.3))
     s.turn = rounded(draw.between(-5, 5), 0.01) * kDegree;
   return s;
 }

@@ -12,7 +12,7 @@ namespace vcnc {
 
 namespace {
 
-void write_file(const std::string& path, const std::string& text) {
+void write_text(const std::string& path, const std::string& text) {
   std::ofstream out(path, std::ios::binary);
   out << text;
   out.close();
@@ -44,10 +44,10 @@ void memory_command(const MemoryOptions& options) {
       files.save(encode_nc_data(kept));
     }
     if (!options.write_tools.empty())
-      write_file(options.write_tools,
+      write_text(options.write_tools,
                  table_of(content.data).to_text(options.tools_unit == "inch" ? 25.4e-3 : 1e-3));
     if (!options.write_parameters.empty())
-      write_file(options.write_parameters, to_var_file(content.data));
+      write_text(options.write_parameters, to_var_file(content.data));
     std::cout << to_text(content);
   } catch (const MemoryError& e) {
     throw InputError(e.what());

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kMarkName = "memory.txt";
-constexpr const char* kMark =
+constexpr const char* kMemoryMark =
     "What a vcnc machine keeps while it is off. See vcnc memory --help.\n";
 
 std::vector<std::uint8_t> bytes_of(const fs::path& path) {
@@ -59,7 +59,7 @@ bool may_become_memory(const fs::path& folder) {
 
 void create_memory(const fs::path& folder) {
   for (const char* owner : kMemoryOwners) SlotFiles(folder, owner).create();
-  const std::string_view mark(kMark);
+  const std::string_view mark(kMemoryMark);
   if (!sync_folder(folder) ||
       !write_durably(folder / kMarkName,
                      {reinterpret_cast<const std::uint8_t*>(mark.data()), mark.size()}) ||

@@ -19,7 +19,8 @@ std::string trimmed(const std::string& text) {
   return text.substr(from, text.find_last_not_of(kBlanks) - from + 1);
 }
 
-void add(const std::string& text, const std::string& where, std::vector<Operation>& operations) {
+void add_operation(const std::string& text, const std::string& where,
+                   std::vector<Operation>& operations) {
   std::istringstream parts(text);
   for (std::string part; std::getline(parts, part, ';');) {
     const std::string one = trimmed(part);
@@ -38,7 +39,7 @@ void add_file(const std::string& path, std::vector<Operation>& operations) {
   int number = 0;
   for (std::string line; std::getline(in, line);) {
     ++number;
-    add(line.substr(0, line.find('#')), path + ":" + std::to_string(number), operations);
+    add_operation(line.substr(0, line.find('#')), path + ":" + std::to_string(number), operations);
   }
 }
 
@@ -51,7 +52,7 @@ std::vector<Operation> read_operations(const std::vector<std::string>& texts) {
     if (std::filesystem::is_regular_file(text, error))
       add_file(text, operations);
     else
-      add(text, "--operate \"" + text + "\"", operations);
+      add_operation(text, "--operate \"" + text + "\"", operations);
   }
   return operations;
 }

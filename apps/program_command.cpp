@@ -22,7 +22,7 @@ struct Arguments : ProgramOptions {
   std::vector<std::string> assignments;
 };
 
-std::unique_ptr<Piece> piece_of(const Machine& machine) {
+std::unique_ptr<Piece> declared_piece(const Machine& machine) {
   return machine.setup.piece.empty() ? nullptr : make_piece(load_piece(machine.setup.piece));
 }
 
@@ -32,7 +32,7 @@ const Piece& needed(const std::unique_ptr<Piece>& piece) {
 }
 
 std::string program_text(const std::string& kind, const Machine& machine, const Arguments& a) {
-  const std::unique_ptr<Piece> piece = piece_of(machine);
+  const std::unique_ptr<Piece> piece = declared_piece(machine);
   if (kind == "s-piece") return s_piece_program(machine, needed(piece), a);
   if (kind == "cone") return cone_program(machine, needed(piece), a);
   if (kind == "circle") return circle_program(machine, piece.get(), a);

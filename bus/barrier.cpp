@@ -8,9 +8,9 @@ namespace vcnc {
 
 namespace {
 
-constexpr int kSliceMs = 100;  // how soon a stop from outside is noticed
+constexpr int kWaitSliceMs = 100;  // how soon a stop from outside is noticed
 
-bool is_set(const std::atomic<bool>* flag) {
+bool stop_asked(const std::atomic<bool>* flag) {
   return flag != nullptr && flag->load(std::memory_order_relaxed);
 }
 
@@ -96,9 +96,9 @@ bool Barrier::collect(Tick k, Frames& answers, int timeout_ms) {
   wasted_ns_ = 0;
   int waited_ms = 0;  // since the last frame that arrived
   while (!complete()) {
-    if (is_set(stop_)) return false;
+    if (stop_asked(stop_)) return false;
     const std::size_t known = answers.size();
-    const int slice_ms = std::min(kSliceMs, timeout_ms - waited_ms);
+    const int slice_ms = std::min(kWaitSliceMs, timeout_ms - waited_ms);
     switch (bus_.receive(answers, slice_ms)) {
       case Transport::Received::closed:
         throw BarrierError(fmt::format("the bus was closed in cycle {}", k));

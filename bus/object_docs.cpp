@@ -59,7 +59,7 @@ std::string range_of(const ObjectEntry& e) {
 }
 
 /// Value for people and data sheets.
-std::string value_of(const ObjectEntry& e) {
+std::string value_told(const ObjectEntry& e) {
   if (e.type == ObjectType::text) return e.get_text();
   const bool hex =
       e.type == ObjectType::u32 && e.access == ObjectAccess::constant && e.unit.empty();
@@ -87,7 +87,7 @@ void append_table(std::string& text, const ObjectDictionary& objects, const Want
     const bool named = head->code == ObjectHead::Code::variable || e.sub != 0;
     text += fmt::format("| {:04X} | {} | {}{} | {} | {} | {} | {} |\n", e.index, e.sub,
                         named ? "" : head->name + ": ", e.name, name_of(e.type), access_of(e),
-                        e.unit, e.access == ObjectAccess::constant ? value_of(e) : range_of(e));
+                        e.unit, e.access == ObjectAccess::constant ? value_told(e) : range_of(e));
   }
 }
 
@@ -168,7 +168,7 @@ std::string electronic_data_sheet(const CanopenDevice& device) {
       text += fmt::format("ParameterName={}\nObjectType=0x7\nDataType=0x{:04X}\nAccessType={}\n",
                           e.name, static_cast<int>(e.type), access_of(e));
       if (e.access != ObjectAccess::read_only)
-        text += fmt::format("DefaultValue={}\n", value_of(e));
+        text += fmt::format("DefaultValue={}\n", value_told(e));
       text += fmt::format("PDOMapping={}\n",
                           e.index >= 0x2800 && e.index < 0x2b00 && e.sub > 0 ? 1 : 0);
     }

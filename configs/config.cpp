@@ -364,12 +364,20 @@ const Parameter& nearest_number(const std::vector<Parameter>& known, const std::
                            [&](const auto& a, const auto& b) { return off(a) < off(b); });
 }
 
+/// "file:line: key" of the i-th of an array of tables; of what was injected, "file: key".
+std::string place_in(const toml::table& table, const std::string& key, std::size_t i,
+                     const std::string& name) {
+  const toml::node& node = *table.at_path(key).as_array()->get(i);
+  return (node.source().path ? where(node) : name) + ": " + key;
+}
+
 /// Bounds that hold what is declared, of numbers that there are.
-void check_uncertainties(const Machine& m, const std::string& name) {
+void check_uncertainties(const Machine& m, const toml::table& table, const std::string& name) {
   Machine copy = m;
   std::set<std::string> known;
-  for (const Uncertainty& u : m.uncertainties) {
-    const std::string where = name + ": uncertainty";
+  for (std::size_t i = 0; i < m.uncertainties.size(); ++i) {
+    const Uncertainty& u = m.uncertainties[i];
+    const std::string where = place_in(table, "uncertainty", i, name);
     if (u.key.empty()) throw ConfigError(where + ": key is missing");
     const std::optional<Parameter> number = find_parameter(copy, u.key);
     if (!number) {
@@ -392,15 +400,17 @@ void check_uncertainties(const Machine& m, const std::string& name) {
 }
 
 /// The same of the machine as it is, and of what makes it so.
-void check_whole(const Machine& m, const std::string& name) {
+void check_whole(const Machine& m, const toml::table& table, const std::string& name) {
   check_written(m, name);
-  check_uncertainties(m, name);
+  check_uncertainties(m, table, name);
   for (std::size_t i = 0; i < m.effects.laws.size(); ++i)
     if (const std::string objection = m.effects.laws[i].objection(); !objection.empty())
-      throw ConfigError(fmt::format("{}: effects.law {}: {}", name, i + 1, objection));
+      throw ConfigError(
+          fmt::format("{} {}: {}", place_in(table, "effects.law", i, name), i + 1, objection));
   std::set<std::string> deviating;
-  for (const Deviation& deviation : m.effects.deviations) {
-    const std::string where = name + ": effects.deviation";
+  for (std::size_t i = 0; i < m.effects.deviations.size(); ++i) {
+    const Deviation& deviation = m.effects.deviations[i];
+    const std::string where = place_in(table, "effects.deviation", i, name);
     if (deviation.key.empty()) throw ConfigError(where + ": key is missing");
     if (std::isnan(deviation.value))
       throw ConfigError(fmt::format("{}: {}: value is missing", where, deviation.key));
@@ -576,7 +586,7 @@ Machine load_machine(const std::string& path, const std::vector<std::string>& as
   for (const std::string& injection : injections) inject(table, injection);
   Machine machine = read<Machine>(table);
   load_tables(machine, path);
-  check_whole(machine, path);
+  check_whole(machine, table, path);
   if (!machine.setup.piece.empty()) {
     std::error_code error;
     const fs::path piece = fs::weakly_canonical(base / machine.setup.piece, error);
@@ -592,7 +602,7 @@ Machine load_machine(const std::string& path, const std::vector<std::string>& as
 Machine parse_machine(std::string_view toml, const std::string& name) {
   const toml::table table = parse(toml, name);
   Machine machine = read<Machine>(table);
-  check_whole(machine, name);
+  check_whole(machine, table, name);
   return machine;
 }
 

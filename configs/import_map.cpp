@@ -16,7 +16,7 @@ namespace vcnc {
 
 namespace {
 
-using Kind = ImportMap::Kind;
+using ColumnKind = ImportMap::Kind;
 
 constexpr std::array kUnits{
     MeasuredUnit{"m", Dimension::length, 1},
@@ -56,37 +56,39 @@ constexpr std::array kUnits{
 constexpr std::array<std::string_view, 3> kProbeNames{"x", "y", "z"};
 
 /// What a signal may be measured in.
-std::vector<Dimension> dimensions(Kind kind, bool rotary) {
+std::vector<Dimension> dimensions(ColumnKind kind, bool rotary) {
   switch (kind) {
-    case Kind::velocity:
+    case ColumnKind::velocity:
       return {rotary ? Dimension::angular_speed : Dimension::speed};
-    case Kind::force:
-    case Kind::applied_force:
-    case Kind::added_force:
+    case ColumnKind::force:
+    case ColumnKind::applied_force:
+    case ColumnKind::added_force:
       return {rotary ? Dimension::torque : Dimension::force};
-    case Kind::deflection:
+    case ColumnKind::deflection:
       return {Dimension::length};
-    case Kind::cosine:
-    case Kind::sine:
+    case ColumnKind::cosine:
+    case ColumnKind::sine:
       return {Dimension::voltage, Dimension::share};
-    case Kind::temperature:
+    case ColumnKind::temperature:
       return {Dimension::temperature};
-    case Kind::clock:
+    case ColumnKind::clock:
       return {Dimension::time};
-    case Kind::command:
-    case Kind::position:
-    case Kind::motor_position:
-    case Kind::load_position:
-    case Kind::twist:
+    case ColumnKind::command:
+    case ColumnKind::position:
+    case ColumnKind::motor_position:
+    case ColumnKind::load_position:
+    case ColumnKind::twist:
       break;
   }
   return {rotary ? Dimension::angle : Dimension::length};
 }
 
-bool of_probe(Kind kind) {
-  return kind == Kind::deflection || kind == Kind::cosine || kind == Kind::sine;
+bool of_probe(ColumnKind kind) {
+  return kind == ColumnKind::deflection || kind == ColumnKind::cosine || kind == ColumnKind::sine;
 }
-bool of_nothing(Kind kind) { return kind == Kind::temperature || kind == Kind::clock; }
+bool of_nothing(ColumnKind kind) {
+  return kind == ColumnKind::temperature || kind == ColumnKind::clock;
+}
 
 int line_of(const KeyLines& lines, std::string_view key) {
   if (const auto at = lines.find(key); at != lines.end()) return at->second;
@@ -130,8 +132,10 @@ std::string_view place_name(const ImportMap& map, std::string_view axis) {
   return axis;
 }
 
-std::string unit_hint(const MeasuredUnit& unit, Kind kind, bool rotary) {
-  if (kind != Kind::force && kind != Kind::applied_force && kind != Kind::added_force) return "";
+std::string unit_hint(const MeasuredUnit& unit, ColumnKind kind, bool rotary) {
+  if (kind != ColumnKind::force && kind != ColumnKind::applied_force &&
+      kind != ColumnKind::added_force)
+    return "";
   if (unit.dimension == Dimension::torque && !rotary)
     return "; of a motor's torque give unit \"N\" and as scale the newtons at the carriage per "
            "newton metre";
@@ -248,7 +252,7 @@ void check_signal(const ImportMap& map, const ImportMap::Signal& s, const Refusa
 void check_signals(const ImportMap& map, const std::string& name) {
   if (map.signals.empty())
     Refusal(name, "", map.lines)("signals", "is missing; a map needs at least one [[signals]]");
-  std::set<std::tuple<Kind, bool, std::size_t>> seen;
+  std::set<std::tuple<ColumnKind, bool, std::size_t>> seen;
   std::set<std::string> columns;
   if (map.time.number > 0 || !map.time.column.empty())
     columns.insert(column_text(map.time.column, map.time.number));
@@ -260,26 +264,29 @@ void check_signals(const ImportMap& map, const std::string& name) {
     if (!columns.insert(column_text(s.column, s.number)).second)
       refuse(s.column.empty() ? "number" : "column",
              fmt::format("column {} is given twice", column_text(s.column, s.number)));
-    if (s.kind != Kind::temperature && !seen.insert({s.kind, place.probe, place.axis}).second)
+    if (s.kind != ColumnKind::temperature && !seen.insert({s.kind, place.probe, place.axis}).second)
       refuse("kind", fmt::format("the {}{} is given twice", to_string(s.kind),
                                  s.axis.empty() ? "" : " of " + s.axis));
   }
   for (const ImportMap::Signal& s : map.signals) {
     const Refusal refuse(name, "signals.", s.lines);
     const SignalPlace place = place_of(map, s);
-    const auto has = [&](Kind kind) { return seen.contains({kind, place.probe, place.axis}); };
-    const bool closed = has(Kind::position);
-    if (s.kind == Kind::twist && (has(Kind::motor_position) || has(Kind::load_position)))
+    const auto has = [&](ColumnKind kind) {
+      return seen.contains({kind, place.probe, place.axis});
+    };
+    const bool closed = has(ColumnKind::position);
+    if (s.kind == ColumnKind::twist &&
+        (has(ColumnKind::motor_position) || has(ColumnKind::load_position)))
       refuse("kind", fmt::format("the twist of {} follows from its two positions, which are given "
                                  "as well",
                                  s.axis));
-    if (s.kind == Kind::load_position && closed && has(Kind::motor_position))
+    if (s.kind == ColumnKind::load_position && closed && has(ColumnKind::motor_position))
       refuse("kind",
              fmt::format("{} has three positions; position is that of the motor or of the load",
                          s.axis));
-    if (s.kind == Kind::sine && !has(Kind::cosine))
+    if (s.kind == ColumnKind::sine && !has(ColumnKind::cosine))
       refuse("kind", fmt::format("{} has a sine, but no cosine", s.axis));
-    if (s.kind == Kind::cosine && !has(Kind::sine))
+    if (s.kind == ColumnKind::cosine && !has(ColumnKind::sine))
       refuse("kind", fmt::format("{} has a cosine, but no sine", s.axis));
   }
 }
@@ -301,33 +308,33 @@ std::string measured_units(Dimension dimension) {
 
 std::string_view to_string(ImportMap::Kind kind) {
   switch (kind) {
-    case Kind::command:
+    case ColumnKind::command:
       return "command";
-    case Kind::position:
+    case ColumnKind::position:
       return "position";
-    case Kind::motor_position:
+    case ColumnKind::motor_position:
       return "motor_position";
-    case Kind::load_position:
+    case ColumnKind::load_position:
       return "load_position";
-    case Kind::twist:
+    case ColumnKind::twist:
       return "twist";
-    case Kind::velocity:
+    case ColumnKind::velocity:
       return "velocity";
-    case Kind::force:
+    case ColumnKind::force:
       return "force";
-    case Kind::applied_force:
+    case ColumnKind::applied_force:
       return "applied_force";
-    case Kind::added_force:
+    case ColumnKind::added_force:
       return "added_force";
-    case Kind::deflection:
+    case ColumnKind::deflection:
       return "deflection";
-    case Kind::cosine:
+    case ColumnKind::cosine:
       return "cosine";
-    case Kind::sine:
+    case ColumnKind::sine:
       return "sine";
-    case Kind::temperature:
+    case ColumnKind::temperature:
       return "temperature";
-    case Kind::clock:
+    case ColumnKind::clock:
       return "clock";
   }
   return "?";

@@ -21,7 +21,7 @@ struct TableReading {
   double mean = 0, mean_slope = 0, half = 0, half_slope = 0;
 };
 
-TableReading read(const CompensationRules::TwoWayCurve& curve, double q) {
+TableReading look_up(const CompensationRules::TwoWayCurve& curve, double q) {
   const std::vector<double>& at = curve.at;
   if (curve.modulo) {
     const double length = at.back() - at.front();
@@ -90,7 +90,7 @@ KnownErrors errors_at(const CompensationRules& rules, const AxisVector& q, const
   e.value[kY] += s.yz * q[kZ];
   e.rate[kY] += s.yz * v[kZ];
   for (const CompensationRules::TwoWayCurve& curve : rules.curves) {
-    const TableReading t = read(curve, q[curve.over]);
+    const TableReading t = look_up(curve, q[curve.over]);
     const SmoothedSign& turned = state.turned[curve.over];
     e.value[curve.axis] += t.mean + turned.value() * t.half;
     e.rate[curve.axis] +=

@@ -20,12 +20,12 @@ constexpr double kFaster[] = {1.0, 1.6, 2.5};         // feeds of the rings over
 constexpr double kHeight = 0.2;                       // of the spins, over the height of the ring
 constexpr double kPause = 0.15;                       // [s]
 
-[[noreturn]] void fail(const std::string& reason) { throw std::invalid_argument(reason); }
+[[noreturn]] void refuse(const std::string& reason) { throw std::invalid_argument(reason); }
 
 double zeroed(double value) { return std::abs(value) < 5e-9 ? 0 : value; }
 
 /// Coordinates in mm.
-std::string point(const Vec3& p) {
+std::string words_of(const Vec3& p) {
   return fmt::format("X{:.5f} Y{:.5f} Z{:.5f}", zeroed(p.x() * 1e3), zeroed(p.y() * 1e3),
                      zeroed(p.z() * 1e3));
 }
@@ -40,11 +40,11 @@ double lap_feed(double radius, double feed) {
 class Writer {
  public:
   Writer(const Machine& machine, const Piece* piece, const ProgramOptions& o) : o_(o) {
-    if (!(o.feed_mm_min > 0)) fail("feed_mm_min must be greater than 0");
-    if (!(o.tolerance_um > 0)) fail("tolerance_um must be greater than 0");
-    if (o.laps < 2 || o.laps > 100) fail("laps must be 2 to 100: one lap tells nothing of noise");
+    if (!(o.feed_mm_min > 0)) refuse("feed_mm_min must be greater than 0");
+    if (!(o.tolerance_um > 0)) refuse("tolerance_um must be greater than 0");
+    if (o.laps < 2 || o.laps > 100) refuse("laps must be 2 to 100: one lap tells nothing of noise");
     if (piece == nullptr) {
-      if (!o.radius_mm) fail("radius_mm is needed without a ring");
+      if (!o.radius_mm) refuse("radius_mm is needed without a ring");
       radius_ = *o.radius_mm * 1e-3;
       const Kinematics kinematics(machine.kinematics, machine.tool_length(1),
                                   machine.setup.work_offset[0]);
@@ -56,12 +56,12 @@ class Writer {
     const PieceParams& ring = piece->params();
     if (ring.kind != PieceParams::Kind::ring || !ring.bore ||
         ring.direction.normalized().z() < 0.999)
-      fail("piece: the program needs a ring that is probed inside, its axis along z");
+      refuse("piece: the program needs a ring that is probed inside, its axis along z");
     const double interference =
         o.predeflection_mm ? *o.predeflection_mm * 1e-3 : machine.setup.predeflection;
     in_ring_ = true;
     radius_ = ring.radius - machine.probe.ball_radius + interference;
-    if (!(radius_ > 5e-3)) fail("piece: the ring is too small");
+    if (!(radius_ > 5e-3)) refuse("piece: the ring is too small");
     centre_ = ring.centre;
     height_ = kHeight * ring.height;
     above_ = 0.5 * ring.height + o.clearance_mm * 1e-3;
@@ -76,7 +76,7 @@ class Writer {
     add("M19 (spindle oriented, at rest)");
     add("G0 A0 C0");
     add("G43 H1");
-    if (in_ring_) add("G0 " + point(centre_ + Vec3(0, 0, above_)));
+    if (in_ring_) add("G0 " + words_of(centre_ + Vec3(0, 0, above_)));
     go(centre_, kTraverse);
     add("G4 P0.5");
     for (const double share : kFaster)
@@ -96,7 +96,7 @@ class Writer {
       lines(2, centre_, 10e-3);
     }
     circle(radius_, 1, 2.5 * o_.feed_mm_min, in_ring_);
-    if (in_ring_) add("G0 " + point(centre_ + Vec3(0, 0, above_)));
+    if (in_ring_) add("G0 " + words_of(centre_ + Vec3(0, 0, above_)));
     add("G49\nG91\nG28 Z0\nG28 X0 Y0\nG28 A0 C0\nG90\nM30");
     return text_;
   }
@@ -104,7 +104,7 @@ class Writer {
  private:
   void add(const std::string& line) { text_ += line + "\n"; }
   void pause() { add(fmt::format("G4 P{:g}", kPause)); }
-  void go(const Vec3& p, double feed) { add(fmt::format("G1 {} F{:g}", point(p), feed)); }
+  void go(const Vec3& p, double feed) { add(fmt::format("G1 {} F{:g}", words_of(p), feed)); }
 
   /// From the centre and back by half circles, an eighth of a turn to either side of the laps.
   void circle(double radius, int turn, double wanted, bool touching) {

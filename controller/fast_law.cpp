@@ -19,7 +19,7 @@ constexpr double kAllowedAtAnyPhase = 0.999;  ///< the same at moments that may 
 constexpr std::size_t kPhases = 4;            ///< of a cycle that are looked at
 constexpr int kMostRepairs = 40;
 constexpr double kFirmer = 0.002;       ///< by which each repair lowers a limit more than the last
-constexpr double kAround = 0.12;        ///< of an excess: the stretch that a repair may change [s]
+constexpr double kAroundExcess = 0.12;  ///< of an excess: the stretch that a repair may change [s]
 constexpr double kTableStep = 0.25e-3;  ///< of the speed law [s]
 constexpr double kSampleStep = 1e-3;    ///< of the differences that the warp is found from [s]
 /// Samples in each of these, on grids no finer than kSampleStep: to see all phases.
@@ -471,7 +471,8 @@ FastLaw::Warp FastLaw::warp_nearest(const std::vector<Excess>& excess, int firmn
   const double end = law_.duration() - (span_.to_rest ? 0 : kGap);
   std::vector<std::pair<double, double>> windows;  // a whole number of cycles long
   for (const Excess& e : excess) {
-    const double from = std::max(earliest, e.t0 - kAround), to = std::min(end, e.t1 + kAround);
+    const double from = std::max(earliest, e.t0 - kAroundExcess),
+                 to = std::min(end, e.t1 + kAroundExcess);
     if (from >= to) continue;
     if (!windows.empty() && from <= windows.back().second)
       windows.back().second = std::max(windows.back().second, to);

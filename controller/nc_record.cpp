@@ -11,7 +11,7 @@ namespace vcnc {
 
 namespace {
 
-constexpr std::uint64_t kVersion = 1;
+constexpr std::uint64_t kRecordVersion = 1;
 constexpr std::size_t kLongestPath = 4096;
 
 void take_hash(StateReader& in, ContentHash& hash) {
@@ -31,7 +31,7 @@ ContentHash hash_of(std::string_view content) {
 
 std::vector<std::uint8_t> encode_record(const NcRecord& r) {
   StateWriter out;
-  out.number(kVersion, 1);
+  out.number(kRecordVersion, 1);
   out.number(static_cast<std::uint64_t>(r.stage), 1);
   out.number(static_cast<std::uint64_t>(r.protection.state), 1);
   out.number(static_cast<std::uint64_t>(r.protection.cause), 1);
@@ -54,7 +54,7 @@ std::vector<std::uint8_t> encode_record(const NcRecord& r) {
 std::optional<NcRecord> decode_record(std::span<const std::uint8_t> bytes) {
   StateReader in(bytes);
   NcRecord r;
-  in.require(in.number(1) == kVersion);
+  in.require(in.number(1) == kRecordVersion);
   r.stage = in.one_of(RunStage::done);
   r.protection.state = in.one_of(ProtectionState::hard);
   r.protection.cause = in.one_of(ProtectionCause::runaway);

@@ -13,7 +13,7 @@ namespace vcnc {
 
 namespace {
 
-using Kind = Operation::Kind;
+using OperationKind = Operation::Kind;
 
 constexpr double kLongest = 1e6;  ///< [s]
 constexpr double kLastLine = 1e9;
@@ -21,20 +21,20 @@ constexpr double kLastLine = 1e9;
 enum class Argument { none, percent, on_off };
 
 struct OperationWord {
-  Kind kind;
+  OperationKind kind;
   std::string_view name;
   Argument argument;
   double largest = 0;  ///< override
 };
 
 constexpr std::array<OperationWord, 7> kOperations{{
-    {Kind::feed, "feed", Argument::percent, kLargestFeedOverride},
-    {Kind::rapid, "rapid", Argument::percent, kLargestRapidOverride},
-    {Kind::hold, "hold", Argument::none},
-    {Kind::start, "start", Argument::none},
-    {Kind::single_block, "single", Argument::on_off},
-    {Kind::optional_stop, "optional-stop", Argument::on_off},
-    {Kind::block_delete, "block-delete", Argument::on_off},
+    {OperationKind::feed, "feed", Argument::percent, kLargestFeedOverride},
+    {OperationKind::rapid, "rapid", Argument::percent, kLargestRapidOverride},
+    {OperationKind::hold, "hold", Argument::none},
+    {OperationKind::start, "start", Argument::none},
+    {OperationKind::single_block, "single", Argument::on_off},
+    {OperationKind::optional_stop, "optional-stop", Argument::on_off},
+    {OperationKind::block_delete, "block-delete", Argument::on_off},
 }};
 
 constexpr const char* kForm =
@@ -136,31 +136,32 @@ const std::vector<Operation>& OperatorPanel::due(Tick k, int line) {
   std::copy_if(waiting_.begin(), waiting_.end(), std::back_inserter(due_), is_due);
   std::erase_if(waiting_, is_due);
   for (const Operation& o : due_) switch (o.kind) {
-      case Kind::feed:
+      case OperationKind::feed:
         switches_.feed = o.value;
         break;
-      case Kind::rapid:
+      case OperationKind::rapid:
         switches_.rapid = o.value;
         break;
-      case Kind::single_block:
+      case OperationKind::single_block:
         switches_.single_block = o.value != 0;
         break;
-      case Kind::optional_stop:
+      case OperationKind::optional_stop:
         switches_.optional_stop = o.value != 0;
         break;
-      case Kind::block_delete:
+      case OperationKind::block_delete:
         switches_.block_delete = o.value != 0;
         break;
-      case Kind::hold:
-      case Kind::start:
+      case OperationKind::hold:
+      case OperationKind::start:
         break;
     }
   return due_;
 }
 
 bool OperatorPanel::start_to_come() const {
-  return std::any_of(waiting_.begin(), waiting_.end(),
-                     [](const Operation& o) { return o.kind == Kind::start && o.timed(); });
+  return std::any_of(waiting_.begin(), waiting_.end(), [](const Operation& o) {
+    return o.kind == OperationKind::start && o.timed();
+  });
 }
 
 bool OperatorPanel::timed_to_come() const {

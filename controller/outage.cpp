@@ -4,7 +4,7 @@ namespace vcnc {
 
 namespace {
 
-constexpr Tick kSettleCycles = 100;
+constexpr Tick kOutageSettleCycles = 100;
 constexpr double kOrientSeconds = 0.2;
 
 }  // namespace
@@ -63,7 +63,7 @@ PlayerStep Outage::step(const Situation& now) {
   const bool stopped = phase_ <= Phase::waiting;
   switch (phase_) {
     case Phase::settling:
-      if (cycles_ < kSettleCycles) break;
+      if (cycles_ < kOutageSettleCycles) break;
       if (touches(now.deflection)) {
         retract_.emplace(machine_, place_, now.deflection);
         enter(Phase::retracting);

@@ -66,7 +66,7 @@ struct Step {
   double value, slope;
 };
 /// 10 u^3 - 15 u^4 + 6 u^5: from 0 to 1 with zero first and second derivative at both ends.
-Step smooth_step(double u) {
+Step smooth_blend(double u) {
   return {u * u * u * (10 + u * (6 * u - 15)), 30 * u * u * (1 - u) * (1 - u)};
 }
 
@@ -384,7 +384,7 @@ Path::Width Path::width(double s) const {
   const Bound& right = *next;
   const Bound& left = *(next - 1);
   const double span = right.s - left.s, rise = right.h - left.h;
-  const Step step = smooth_step(std::clamp((s - left.s) / span, 0.0, 1.0));
+  const Step step = smooth_blend(std::clamp((s - left.s) / span, 0.0, 1.0));
   return {left.h + rise * step.value, rise * step.slope / span};
 }
 

@@ -11,8 +11,8 @@
 namespace vcnc {
 namespace {
 
-constexpr double kAllowed = 1.0005;  ///< share of a limit that the check lets pass
-constexpr double kRepairMargin = 0.98;
+constexpr double kPlanAllowed = 1.0005;  ///< share of a limit that the check lets pass
+constexpr double kPlanRepairMargin = 0.98;
 constexpr double kSpan = 10;    ///< of the fast law that is found at once [s]
 constexpr int kMostWaits = 16;  ///< for batches without a path; then the run ends there
 constexpr int kScalings = 50;   ///< a few suffice; more would chase the rounding of tiny limits
@@ -246,7 +246,7 @@ std::vector<Trajectory::Excess> Trajectory::verify() const {
         third.cwiseAbs().cwiseQuotient(limits_.jerk).maxCoeff()};
     for (int order = 1; order <= 3; ++order) {
       const double ratio = ratios[static_cast<std::size_t>(order - 1)];
-      if (ratio > kAllowed) excess.push_back({t - order * kCycle, t, ratio, order});
+      if (ratio > kPlanAllowed) excess.push_back({t - order * kCycle, t, ratio, order});
     }
   }
   return excess;
@@ -255,7 +255,7 @@ std::vector<Trajectory::Excess> Trajectory::verify() const {
 void Trajectory::lower(const std::vector<Excess>& excess) {
   std::vector<double> v(nodes_.size(), 1), a(nodes_.size(), 1);
   for (const Excess& e : excess) {
-    const double ratio = e.ratio / kRepairMargin;
+    const double ratio = e.ratio / kPlanRepairMargin;
     const double v_factor = std::pow(ratio, -1.0 / e.order);
     const double a_factor = e.order == 1 ? 1 : 1 / ratio;
     const double from = law_.raw_position(e.t0 - law_.window()), to = law_.raw_position(e.t1);

@@ -9,7 +9,7 @@ namespace vcnc {
 namespace {
 
 /// The averaged position is ahead of or behind the middle of the window where the speed changes.
-constexpr double kReach = 1.1;
+constexpr double kWindowReach = 1.1;
 constexpr std::size_t kLastNodes = 8;
 
 /// Each limit v spread over +- v T/2: the least of all that reach a node.
@@ -30,7 +30,7 @@ std::vector<double> spread_limits(const std::vector<LimitNode>& nodes, double wi
     return root;
   };
   for (const std::size_t j : order) {
-    const double limit = nodes[j].v_max, reach = kReach * 0.5 * limit * window;
+    const double limit = nodes[j].v_max, reach = kWindowReach * 0.5 * limit * window;
     const auto below = [](const LimitNode& node, double s) { return node.s < s; };
     const auto first = std::lower_bound(nodes.begin(), nodes.end(), nodes[j].s - reach, below);
     const auto last = std::lower_bound(first, nodes.end(), nodes[j].s + reach, below);
@@ -86,7 +86,7 @@ void SpeedLaw::find(const std::vector<LimitNode>& nodes, const MotionLimits& lim
   // What lies before a node that does not brake for the end, does not either. The last nodes may
   // change, and limits behind the end reach back.
   const double fastest = *std::max_element(v.begin(), v.end());
-  const double known = nodes.back().s - kReach * 0.5 * fastest * window_;
+  const double known = nodes.back().s - kWindowReach * 0.5 * fastest * window_;
   settled_ = n;
   for (std::size_t j = n - 1; j-- > 0;) {
     const double least = reachable(nodes[j + 1], nodes[j], v[j + 1], window_, limits);

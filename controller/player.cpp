@@ -22,14 +22,14 @@ namespace {
 
 // A longer run is planned in batches of about this size, so that it takes bounded memory.
 constexpr std::size_t kMostMoves = 20'000;
-constexpr double kLongestWay = 20;       ///< [m] of the controlled point
-constexpr double kLongestSeconds = 600;  ///< at the programmed feed
-constexpr double kMostNodes = 4e6;       ///< of the plan, estimated
-constexpr double kLongestMove = 36000;   ///< [s] at the limits of the axes
+constexpr double kLongestWay = 20;          ///< [m] of the controlled point
+constexpr double kLongestSeconds = 600;     ///< at the programmed feed
+constexpr double kMostNodes = 4e6;          ///< of the plan, estimated
+constexpr double kLongestTraverse = 36000;  ///< [s] at the limits of the axes
 constexpr double kExactCorner = 1.0 * kDegree;
 constexpr double kLargestChord = 2 * kPi / 3;  ///< angle of a chord
 constexpr int kMostChords = 20'000;            ///< per arc
-constexpr double kOrientSeconds = 0.2;         ///< from a standing spindle into its M19 position
+constexpr double kOrientFromRest = 0.2;        ///< from a standing spindle into its M19 position
 
 /// About how far the controlled point goes in a move [m].
 double way_of(const Move& move) {
@@ -111,11 +111,11 @@ void check_move(const Move& move, const Machine& machine, const std::string& pat
     const double share = move.kind == Move::Kind::rapid ? machine.nc.rapid_limit : 1;
     const double hours = std::abs(way[static_cast<Eigen::Index>(i)]) /
                          (share * machine.axes[i].limits.velocity) / 3600;
-    if (hours > kLongestMove / 3600)
+    if (hours > kLongestTraverse / 3600)
       throw ProgramError(
           fmt::format("{}: at the largest velocity of {} the move would last {:.1f} h; allowed is "
                       "up to {:.0f} h",
-                      where, kAxisNames[i], hours, kLongestMove / 3600));
+                      where, kAxisNames[i], hours, kLongestTraverse / 3600));
   }
   if (!move.frame.rtcp && move.kind != Move::Kind::arc) {
     check_travel(move.end, machine, where);
@@ -913,7 +913,7 @@ struct Player::State {
     step.spindle_speed = word.speed;
     surface = word.surface;
     begin_wait(change / machine.spindle.acceleration +
-               (word.mode == Mode::orient ? kOrientSeconds : 0));
+               (word.mode == Mode::orient ? kOrientFromRest : 0));
   }
 
   /// Before a probing move: its reading is that of axes at rest, or is waited for.

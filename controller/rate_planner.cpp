@@ -8,11 +8,11 @@ namespace vcnc {
 
 namespace {
 
-constexpr double kShortest = 10 * kCycle;
-constexpr double kRounding = 1e-6;  ///< of a cycle: a change that is aligned stays as it is
-constexpr double kHorizon = 2;      ///< so far ahead on the path is looked [s]
-constexpr double kSteepest = 1.5;   ///< of a change: largest r' T / |r1 - r0|
-constexpr double kCurved = 6;       ///< largest r'' T^2 / |r1 - r0|
+constexpr double kShortestChange = 10 * kCycle;
+constexpr double kAligned = 1e-6;        ///< of a cycle: a change that is aligned stays as it is
+constexpr double kHorizon = 2;           ///< so far ahead on the path is looked [s]
+constexpr double kSteepestChange = 1.5;  ///< of a change: largest r' T / |r1 - r0|
+constexpr double kCurved = 6;            ///< largest r'' T^2 / |r1 - r0|
 constexpr double kGrowth = 1.3;
 constexpr int kCandidates = 10;
 
@@ -46,7 +46,7 @@ AlignedChange aligned(const RateChange& change) {
   AlignedChange result{change};
   if (change.to != 1 || change.from == 1) return result;
   const double whole = whole_cycles(change.start), fraction = change.start / kCycle - whole;
-  const double passed = 0.5 * change.time * std::abs(1 - change.from) / kCycle - kRounding;
+  const double passed = 0.5 * change.time * std::abs(1 - change.from) / kCycle - kAligned;
   if (change.from < 1) {
     const double n = std::max(std::ceil(passed - fraction), 1.0);
     result.change.time = 2 * (n + fraction) * kCycle / (1 - change.from);
@@ -75,7 +75,7 @@ double RatePlanner::shortest_time(const Trajectory& run, double at, double diffe
   const MotionSample now = run.at(at);
   const Coordinates v = Eigen::Map<const Coordinates>(now.dq.data()) * std::abs(difference);
   const MotionLimits& most = limits(run);
-  return std::max({kShortest, kSteepest * largest(v, most.acceleration) / share,
+  return std::max({kShortestChange, kSteepestChange * largest(v, most.acceleration) / share,
                    std::sqrt(kCurved * largest(v, most.jerk) / share)});
 }
 

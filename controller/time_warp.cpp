@@ -9,8 +9,8 @@ namespace {
 
 constexpr double kLastExcess = 1e-4;  ///< of a limit
 constexpr int kMostSteps = 60;
-constexpr double kFirstSlack = 0.1;  ///< at least; where the limit leaves less, it is exceeded
-constexpr double kSlowest = 1e-4;    ///< of c; the solver has lost its way below
+constexpr double kFirstSlack = 0.1;    ///< at least; where the limit leaves less, it is exceeded
+constexpr double kSlowestTime = 1e-4;  ///< of c; the solver has lost its way below
 constexpr double kFirstGap = 0.1;
 constexpr double kFirstGapOfNearest = 1e-4;
 constexpr double kToBoundary = 0.95;  ///< share of the way to the nearest limit that a step goes
@@ -303,7 +303,7 @@ std::vector<double> time_warp(const std::vector<WarpNode>& nodes, WarpAim aim, d
   const std::vector<double>& c = solver.coefficients();
   // The outer coefficients count little; the others are positive where the solver came to an end.
   const bool sound = std::all_of(c.begin() + 1, c.end() - 1,
-                                 [](double x) { return std::isfinite(x) && x > kSlowest; });
+                                 [](double x) { return std::isfinite(x) && x > kSlowestTime; });
   return sound && std::isfinite(c.front()) && std::isfinite(c.back())
              ? c
              : std::vector<double>(c.size(), 1.0);

@@ -23,7 +23,7 @@ constexpr double kFixed = 1e12;  ///< precision of a number that stays
 /// What an effect of the probe or the geometry must explain of what is left: less than that is the
 /// form of the contact.
 constexpr double kShareOfMeasuring = 0.05;
-constexpr double kNearly = 0.95;  ///< of the most that one promises: as good
+constexpr double kNearlyAsGood = 0.95;  ///< of the most that one promises: as good
 
 /// Effects of an axis that are fitted together, or its lags.
 struct FrictionLaw {
@@ -243,7 +243,7 @@ class Commissioner {
   std::ptrdiff_t simplest_of_best(const std::vector<std::size_t>& candidates,
                                   const std::vector<double>& promise) const {
     const auto first = std::min_element(promise.begin(), promise.end());
-    const double enough = machine_.held_out - kNearly * (machine_.held_out - *first);
+    const double enough = machine_.held_out - kNearlyAsGood * (machine_.held_out - *first);
     std::ptrdiff_t best = first - promise.begin();
     const auto numbers = [&](std::ptrdiff_t i) {
       return candidates_[candidates[static_cast<std::size_t>(i)]].numbers.size();

@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t kWakeRows = 20;                     ///< rows that are worth a message
 constexpr std::size_t kMostRows = 100;                    ///< rows in one message
 constexpr auto kPatience = std::chrono::milliseconds(2);  ///< with fewer rows than that
-constexpr int kSliceMs = 20;
+constexpr int kMatchSliceMs = 20;
 constexpr int kStallMs = 60'000;  ///< a subscriber that takes nothing for so long is stuck
 
 using dds::check;
@@ -123,13 +123,13 @@ DdsPublisher::~DdsPublisher() {
 
 void DdsPublisher::wait_for_subscriber(int timeout_ms) {
   State& s = *state_;
-  for (int waited_ms = 0;; waited_ms += kSliceMs) {
+  for (int waited_ms = 0;; waited_ms += kMatchSliceMs) {
     if (const std::size_t n = s.read_progress(); n > 0 && s.rows.matched() >= n) return;
     if (waited_ms >= timeout_ms)
       throw DdsError("no analysis has subscribed to the telemetry within " +
                      std::to_string(timeout_ms) + " ms");
     // Matching has no data to wake up for, so the wait is cut into slices
-    check(dds_waitset_wait(s.waitset.get(), nullptr, 0, DDS_MSECS(kSliceMs)), "waiting");
+    check(dds_waitset_wait(s.waitset.get(), nullptr, 0, DDS_MSECS(kMatchSliceMs)), "waiting");
   }
 }
 
@@ -314,9 +314,9 @@ bool DdsPublisher::State::anyone_behind(std::uint64_t seq) {
 
 void DdsPublisher::State::await_window(std::uint64_t seq) {
   read_progress();
-  for (int waited_ms = 0; anyone_behind(seq) && !is_stopping(); waited_ms += kSliceMs) {
+  for (int waited_ms = 0; anyone_behind(seq) && !is_stopping(); waited_ms += kMatchSliceMs) {
     if (waited_ms >= kStallMs) throw DdsError("a subscriber has stopped taking rows");
-    check(dds_waitset_wait(waitset.get(), nullptr, 0, DDS_MSECS(kSliceMs)), "waiting");
+    check(dds_waitset_wait(waitset.get(), nullptr, 0, DDS_MSECS(kMatchSliceMs)), "waiting");
     read_progress();
   }
 }

@@ -19,7 +19,7 @@
 namespace vcnc {
 namespace {
 
-constexpr int kSliceMs = 50;
+constexpr int kTakeSliceMs = 50;
 constexpr int kLateSlices = 20;               ///< patience with what should be on its way: 1 s
 constexpr std::uint64_t kReportEvery = 2000;  ///< rows between two progress messages
 
@@ -48,7 +48,7 @@ struct DdsSubscriber::State {
   void run();
   void follow();
   void wait() {
-    check(dds_waitset_wait(waitset.get(), nullptr, 0, DDS_MSECS(kSliceMs)), "waiting");
+    check(dds_waitset_wait(waitset.get(), nullptr, 0, DDS_MSECS(kTakeSliceMs)), "waiting");
   }
   void announce();
   void report(const dds::Guid& to);

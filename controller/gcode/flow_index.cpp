@@ -10,27 +10,27 @@
 namespace vcnc {
 namespace {
 
-using Kind = FlowLine::Kind;
+using LineKind = FlowLine::Kind;
 
 struct KindWord {
   const char* word;
-  Kind kind;
+  LineKind kind;
 };
-constexpr KindWord kWords[] = {{"SUB", Kind::sub},
-                               {"ENDSUB", Kind::end_sub},
-                               {"RETURN", Kind::give_back},
-                               {"CALL", Kind::call},
-                               {"IF", Kind::when},
-                               {"ELSEIF", Kind::else_when},
-                               {"ELSE", Kind::otherwise},
-                               {"ENDIF", Kind::end_when},
-                               {"WHILE", Kind::loop_while},
-                               {"ENDWHILE", Kind::end_while},
-                               {"DO", Kind::loop_do},
-                               {"REPEAT", Kind::repeat},
-                               {"ENDREPEAT", Kind::end_repeat},
-                               {"BREAK", Kind::leave},
-                               {"CONTINUE", Kind::go_on}};
+constexpr KindWord kWords[] = {{"SUB", LineKind::sub},
+                               {"ENDSUB", LineKind::end_sub},
+                               {"RETURN", LineKind::give_back},
+                               {"CALL", LineKind::call},
+                               {"IF", LineKind::when},
+                               {"ELSEIF", LineKind::else_when},
+                               {"ELSE", LineKind::otherwise},
+                               {"ENDIF", LineKind::end_when},
+                               {"WHILE", LineKind::loop_while},
+                               {"ENDWHILE", LineKind::end_while},
+                               {"DO", LineKind::loop_do},
+                               {"REPEAT", LineKind::repeat},
+                               {"ENDREPEAT", LineKind::end_repeat},
+                               {"BREAK", LineKind::leave},
+                               {"CONTINUE", LineKind::go_on}};
 
 /// Past the bracket that closes the one here, or to the end.
 void skip_bracketed(Cursor& at) {
@@ -69,7 +69,7 @@ std::optional<FlowLine> o_line(Cursor& at) {
     at.skip_blanks();
     if (at.letters() != "CALL")
       throw LineError("an O word with a computed label; allowed is that for call only", column);
-    return FlowLine{.kind = Kind::call};
+    return FlowLine{.kind = LineKind::call};
   } else {
     throw LineError("O without its number or <name>", column);
   }
@@ -82,7 +82,7 @@ std::optional<FlowLine> o_line(Cursor& at) {
                                 "else endif while endwhile do repeat endrepeat break continue",
                                 label, word),
                     column);
-  return FlowLine{.kind = Kind::program, .label = label};
+  return FlowLine{.kind = LineKind::program, .label = label};
 }
 
 /// The number behind DO or END, as a label of its own kind.
@@ -107,11 +107,12 @@ std::optional<FlowLine> macro_line(Cursor& at, bool& macros) {
     skip_bracketed(at);
     at.skip_blanks();
     if (!at.take_word("DO")) throw LineError("WHILE [..] is followed by DO n", at.column());
-    return FlowLine{.kind = Kind::macro_while, .label = do_label(at)};
+    return FlowLine{.kind = LineKind::macro_while, .label = do_label(at)};
   }
   if (word == "DO" || word == "END") {
     at.advance(word.size());
-    return FlowLine{.kind = word == "DO" ? Kind::macro_do : Kind::macro_end, .label = do_label(at)};
+    return FlowLine{.kind = word == "DO" ? LineKind::macro_do : LineKind::macro_end,
+                    .label = do_label(at)};
   }
   return std::nullopt;
 }
@@ -128,18 +129,24 @@ std::string name_of(const FlowLine& line) {
                                       : fmt::format("O{} {}", line.label, word);
 }
 
-constexpr KindWord kSiemensWords[] = {
-    {"IF", Kind::when},          {"ELSE", Kind::otherwise},     {"ENDIF", Kind::end_when},
-    {"WHILE", Kind::loop_while}, {"ENDWHILE", Kind::end_while}, {"FOR", Kind::loop_for},
-    {"ENDFOR", Kind::end_for},   {"REPEAT", Kind::loop_until},  {"UNTIL", Kind::until},
-    {"LOOP", Kind::loop_ever},   {"ENDLOOP", Kind::end_ever}};
+constexpr KindWord kSiemensWords[] = {{"IF", LineKind::when},
+                                      {"ELSE", LineKind::otherwise},
+                                      {"ENDIF", LineKind::end_when},
+                                      {"WHILE", LineKind::loop_while},
+                                      {"ENDWHILE", LineKind::end_while},
+                                      {"FOR", LineKind::loop_for},
+                                      {"ENDFOR", LineKind::end_for},
+                                      {"REPEAT", LineKind::loop_until},
+                                      {"UNTIL", LineKind::until},
+                                      {"LOOP", LineKind::loop_ever},
+                                      {"ENDLOOP", LineKind::end_ever}};
 
 /// IF that only decides about a jump is a block like others.
 std::optional<FlowLine> siemens_line(Cursor& at) {
   const std::string word = at.letters();
   for (const KindWord& known : kSiemensWords) {
     if (word != known.word) continue;
-    if (known.kind == Kind::when) {
+    if (known.kind == LineKind::when) {
       std::string rest(at.rest().substr(0, at.rest().find(';')));
       for (char& c : rest) c = upper(c);
       if (rest.find("GOTO") != std::string::npos) return std::nullopt;
@@ -156,29 +163,29 @@ bool begins_flow(char c) {
 
 }  // namespace
 
-const char* flow_word(Kind kind) {
+const char* flow_word(LineKind kind) {
   for (const KindWord& known : kWords)
     if (known.kind == kind) return known.word;
   switch (kind) {
-    case Kind::while_after:
+    case LineKind::while_after:
       return "WHILE";
-    case Kind::macro_while:
+    case LineKind::macro_while:
       return "WHILE";
-    case Kind::macro_do:
+    case LineKind::macro_do:
       return "DO";
-    case Kind::macro_end:
+    case LineKind::macro_end:
       return "END";
-    case Kind::loop_for:
+    case LineKind::loop_for:
       return "FOR";
-    case Kind::end_for:
+    case LineKind::end_for:
       return "ENDFOR";
-    case Kind::loop_until:
+    case LineKind::loop_until:
       return "REPEAT";
-    case Kind::until:
+    case LineKind::until:
       return "UNTIL";
-    case Kind::loop_ever:
+    case LineKind::loop_ever:
       return "LOOP";
-    case Kind::end_ever:
+    case LineKind::end_ever:
       return "ENDLOOP";
     default:
       return "";
@@ -226,7 +233,7 @@ FlowIndex::FlowIndex(ProgramText& text, bool siemens) {
   }
   for (const int i : open_) {
     const FlowLine& line = lines_[static_cast<std::size_t>(i)];
-    if (line.kind == Kind::program) continue;
+    if (line.kind == LineKind::program) continue;
     refuse(text.path(), line, name_of(line) + " without its end");
   }
   open_ = {};
@@ -235,7 +242,7 @@ FlowIndex::FlowIndex(ProgramText& text, bool siemens) {
 
 /// Takes the innermost open line off, which must have the label and be of one of the kinds.
 int FlowIndex::close(const FlowLine& line, const std::string& path,
-                     std::initializer_list<Kind> by) {
+                     std::initializer_list<LineKind> by) {
   if (open_.empty()) refuse(path, line, name_of(line) + " without its begin");
   const int i = open_.back();
   const FlowLine& begin = lines_[static_cast<std::size_t>(i)];
@@ -256,7 +263,7 @@ void FlowIndex::enter(FlowLine line, const std::string& path) {
     lines_[static_cast<std::size_t>(begin)].next = me;
   };
   switch (line.kind) {
-    case Kind::sub:
+    case LineKind::sub:
       if (!open_.empty())
         refuse(path, line,
                fmt::format("O{} sub within line {}; a sub stands for itself", line.label,
@@ -265,61 +272,62 @@ void FlowIndex::enter(FlowLine line, const std::string& path) {
         refuse(path, line, fmt::format("O{} sub given twice", line.label));
       open(me);
       break;
-    case Kind::when:
-    case Kind::loop_do:
-    case Kind::repeat:
-    case Kind::macro_while:
-    case Kind::macro_do:
-    case Kind::loop_for:
-    case Kind::loop_until:
-    case Kind::loop_ever:
+    case LineKind::when:
+    case LineKind::loop_do:
+    case LineKind::repeat:
+    case LineKind::macro_while:
+    case LineKind::macro_do:
+    case LineKind::loop_for:
+    case LineKind::loop_until:
+    case LineKind::loop_ever:
       open(me);
       break;
-    case Kind::loop_while: {
+    case LineKind::loop_while: {
       // It ends a do loop of the same label if that is the innermost open line.
       const FlowLine* begin =
           open_.empty() ? nullptr : &lines_[static_cast<std::size_t>(open_.back())];
-      if (begin && begin->kind == Kind::loop_do && begin->label == line.label) {
-        line.kind = Kind::while_after;
-        joined(close(line, path, {Kind::loop_do}));
+      if (begin && begin->kind == LineKind::loop_do && begin->label == line.label) {
+        line.kind = LineKind::while_after;
+        joined(close(line, path, {LineKind::loop_do}));
       } else {
         open(me);
       }
       break;
     }
-    case Kind::end_sub:
-      joined(close(line, path, {Kind::sub}));
+    case LineKind::end_sub:
+      joined(close(line, path, {LineKind::sub}));
       break;
-    case Kind::end_while:
-      joined(close(line, path, {Kind::loop_while}));
+    case LineKind::end_while:
+      joined(close(line, path, {LineKind::loop_while}));
       break;
-    case Kind::end_repeat:
-      joined(close(line, path, {Kind::repeat}));
+    case LineKind::end_repeat:
+      joined(close(line, path, {LineKind::repeat}));
       break;
-    case Kind::macro_end:
-      joined(close(line, path, {Kind::macro_while, Kind::macro_do}));
+    case LineKind::macro_end:
+      joined(close(line, path, {LineKind::macro_while, LineKind::macro_do}));
       break;
-    case Kind::end_for:
-      joined(close(line, path, {Kind::loop_for}));
+    case LineKind::end_for:
+      joined(close(line, path, {LineKind::loop_for}));
       break;
-    case Kind::until:
-      joined(close(line, path, {Kind::loop_until}));
+    case LineKind::until:
+      joined(close(line, path, {LineKind::loop_until}));
       break;
-    case Kind::end_ever:
-      joined(close(line, path, {Kind::loop_ever}));
+    case LineKind::end_ever:
+      joined(close(line, path, {LineKind::loop_ever}));
       break;
-    case Kind::else_when:
-    case Kind::otherwise:
-    case Kind::end_when: {
+    case LineKind::else_when:
+    case LineKind::otherwise:
+    case LineKind::end_when: {
       const int before =
           close(line, path,
-                line.kind == Kind::end_when
-                    ? std::initializer_list<Kind>{Kind::when, Kind::else_when, Kind::otherwise}
-                    : std::initializer_list<Kind>{Kind::when, Kind::else_when});
+                line.kind == LineKind::end_when
+                    ? std::initializer_list<LineKind>{LineKind::when, LineKind::else_when,
+                                                      LineKind::otherwise}
+                    : std::initializer_list<LineKind>{LineKind::when, LineKind::else_when});
       lines_[static_cast<std::size_t>(before)].next = me;
       line.end = before;  // back along the branches, until the endif is known
-      if (line.kind != Kind::end_when) open(me);
-      if (line.kind == Kind::end_when)
+      if (line.kind != LineKind::end_when) open(me);
+      if (line.kind == LineKind::end_when)
         for (int i = before; i >= 0;) {
           FlowLine& branch = lines_[static_cast<std::size_t>(i)];
           i = branch.end;
@@ -327,17 +335,17 @@ void FlowIndex::enter(FlowLine line, const std::string& path) {
         }
       break;
     }
-    case Kind::leave:
-    case Kind::go_on:
+    case LineKind::leave:
+    case LineKind::go_on:
       for (auto i = open_.rbegin(); i != open_.rend() && line.next < 0; ++i) {
         const FlowLine& begin = lines_[static_cast<std::size_t>(*i)];
-        const bool loop = begin.kind == Kind::loop_while || begin.kind == Kind::loop_do ||
-                          begin.kind == Kind::repeat;
+        const bool loop = begin.kind == LineKind::loop_while || begin.kind == LineKind::loop_do ||
+                          begin.kind == LineKind::repeat;
         if (loop && begin.label == line.label) line.next = *i;
       }
       if (line.next < 0) refuse(path, line, name_of(line) + " outside a loop of that label");
       break;
-    case Kind::program:
+    case LineKind::program:
       programs_.emplace(line.label, me);
       break;
     default:

@@ -24,7 +24,7 @@ namespace {
 
 constexpr double kChipBreak = 0.254e-3;      ///< [m]
 constexpr double kPeckClearance = 0.254e-3;  ///< [m]
-constexpr int kMostRepeats = 100'000;
+constexpr int kMostCycleRepeats = 100'000;
 constexpr double kMostPecks = 100'000;
 
 }  // namespace
@@ -98,9 +98,10 @@ void ProgramRun::emit_cycle(int code) {
     fail(name + " with the spindle at rest; M3 or M4 first", column);
   if (turns != modal_.spindle) fail(fmt::format("{} needs M{}", name, turns), column);
   const int repeats = words_.has('L') ? whole_number(words_.value('L')) : 1;
-  if (repeats < 0 || repeats > kMostRepeats)
-    fail(fmt::format("L{:g} of {}: allowed are 0 to {}", words_.value('L'), name, kMostRepeats),
-         words_.column('L'));
+  if (repeats < 0 || repeats > kMostCycleRepeats)
+    fail(
+        fmt::format("L{:g} of {}: allowed are 0 to {}", words_.value('L'), name, kMostCycleRepeats),
+        words_.column('L'));
 
   Coordinates at = work_.to_words(position_);
   if (!cycle_.initial) cycle_.initial = at[w];

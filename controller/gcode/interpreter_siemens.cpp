@@ -23,7 +23,7 @@
 namespace vcnc {
 namespace {
 
-constexpr int kMostTurns = 999;
+constexpr int kMostTurnsOfArc = 999;
 
 /// Read, and the same as without them here.
 constexpr std::array kWithoutEffect{"FFWON",  "FFWOF",   "SOFT",   "BRISK",  "DRIVE",   "STOPRE",
@@ -78,8 +78,8 @@ bool ProgramRun::read_siemens_word(Cursor& at) {
   if (word == "TURN" && at.peek(word.size()) == '=') {
     at.advance(word.size() + 1);
     const double turns = evaluator_.bare(at);
-    if (whole_number(turns) < 0 || turns > kMostTurns)
-      fail(fmt::format("TURN={:g}: allowed is a whole number from 0 to {}", turns, kMostTurns),
+    if (whole_number(turns) < 0 || turns > kMostTurnsOfArc)
+      fail(fmt::format("TURN={:g}: allowed is a whole number from 0 to {}", turns, kMostTurnsOfArc),
            column);
     words_.enter('P', turns + 1, column);
     return true;

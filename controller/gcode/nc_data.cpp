@@ -11,7 +11,7 @@ namespace vcnc {
 
 namespace {
 
-constexpr std::uint64_t kVersion = 2;
+constexpr std::uint64_t kDataVersion = 2;
 constexpr int kFirstReference = 5161, kFirstOffset = 5221, kLastOffset = 5390;
 constexpr int kPerSystem = NcData::kPerSystem;
 constexpr int kG92Active = 5210, kRotation = 9, kLinearAxes = 3;
@@ -94,7 +94,7 @@ double NcData::unit_of(int number) {
 
 std::vector<std::uint8_t> encode_nc_data(const KeptNcData& data) {
   StateWriter out;
-  out.number(kVersion, 1);
+  out.number(kDataVersion, 1);
   write(data.begin, out);
   write(data.now, out);
   write(data.touches, out);
@@ -104,11 +104,11 @@ std::vector<std::uint8_t> encode_nc_data(const KeptNcData& data) {
 std::optional<KeptNcData> decode_nc_data(std::span<const std::uint8_t> bytes) {
   StateReader in(bytes);
   const std::uint64_t version = in.number(1);
-  in.require(version == 1 || version == kVersion);
+  in.require(version == 1 || version == kDataVersion);
   KeptNcData data;
   data.begin = read(in);
   data.now = read(in);
-  if (version == kVersion) data.touches = read_touches(in);
+  if (version == kDataVersion) data.touches = read_touches(in);
   if (!in.whole()) return std::nullopt;
   return data;
 }

@@ -8,7 +8,7 @@
 #include "diagnosis/records/import_table.hpp"
 #include "diagnosis/records/record_file.hpp"
 #include "diagnosis/records/record_from_recording.hpp"
-#include "diagnosis/replica/fingerprint.hpp"
+#include "model/fingerprint.hpp"
 
 namespace vcnc {
 

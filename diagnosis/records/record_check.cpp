@@ -56,7 +56,7 @@ Series smoothed(const Series& value, std::size_t half) {
   return result;
 }
 
-Series derivative(const Series& value, double period) {
+Series slope_of(const Series& value, double period) {
   Series result(value.size(), kMissing);
   for (std::size_t k = 1; k + 1 < value.size(); ++k)
     result[k] = (value[k + 1] - value[k - 1]) / (2 * period);
@@ -153,7 +153,7 @@ class Checker {
 
   /// Smoothed velocity of a position.
   Series speed_of(const MeasuredSignal& s) const {
-    return smoothed(derivative(s.value, record_.period), half_);
+    return smoothed(slope_of(s.value, record_.period), half_);
   }
   const MeasuredSignal* motion(std::size_t axis) const {
     const MeasuredSignal* s = record_.find(SignalKind::position, axis);
@@ -223,10 +223,10 @@ class Checker {
     const bool belongs = std::abs(r.correlation) >= kBelongs;
     if (belongs && std::abs(r.slope - 1) <= kSlope) return;
     if (fits(relate(speed_of(s), smoothed(own->value, half_))))
-      refuse(fmt::format("{} is the derivative of {}: the columns are swapped", name(*own),
+      refuse(fmt::format("{} is the slope_of of {}: the columns are swapped", name(*own),
                          speed_name(s)));
     if (belongs) {
-      const std::string found = fmt::format("{} is {:.4g} times the derivative of {}{}",
+      const std::string found = fmt::format("{} is {:.4g} times the slope_of of {}{}",
                                             speed_name(s), r.slope, name(*own), mistake(r.slope));
       if (!(r.slope > 0.75 && r.slope < 1.33))
         refuse(found + "; check unit, scale and sign of the two columns");
@@ -236,11 +236,11 @@ class Checker {
     for (std::size_t other = 0; other < kAxisCount; ++other) {
       const MeasuredSignal* o = motion(other);
       if (o && other != s.axis && !constant(o->value) && fits(relate(speed_of(*o), measured)))
-        refuse(fmt::format("{} is the derivative of {}, not of {}: the columns are swapped",
+        refuse(fmt::format("{} is the slope_of of {}, not of {}: the columns are swapped",
                            speed_name(s), name(*o), name(*own)));
     }
     refuse(
-        fmt::format("{} is not the derivative of {} (correlation {:.2f}); one of the columns is "
+        fmt::format("{} is not the slope_of of {} (correlation {:.2f}); one of the columns is "
                     "another signal",
                     speed_name(s), name(*own), r.correlation));
   }
@@ -346,7 +346,7 @@ class Checker {
 
   std::optional<ForceFit> fit_force(const MeasuredSignal& force, const MeasuredSignal& position) {
     const Series v = speed_of(position);
-    const Series a = smoothed(derivative(v, record_.period), half_);
+    const Series a = smoothed(slope_of(v, record_.period), half_);
     const Series f = smoothed(smoothed(force.value, half_), half_);
     double fastest = 0;
     for (const double x : v)

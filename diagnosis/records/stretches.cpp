@@ -7,7 +7,7 @@
 #include <cmath>
 #include <optional>
 
-#include "diagnosis/replica/commanded_motion.hpp"
+#include "diagnosis/records/commanded_motion.hpp"
 #include "model/axes.hpp"
 #include "model/math.hpp"
 
@@ -18,10 +18,10 @@ constexpr double kSame = 5e-6;          // [m or rad] between commands of equal 
 constexpr double kSameRoughly = 50e-6;  // [m or rad] between stretches of one condition
 constexpr double kSameForces =
     0.05;  // share of known forces that those of another lap may differ by
-constexpr double kShortestLap = 0.1;   // [s]
-constexpr double kLeastTravel = 2e-3;  // [m or rad] of a lap
-constexpr double kSearchStep = 20e-3;  // [s] between samples at which a lap may begin
-constexpr std::size_t kShares = 16;    // at which stretches are compared
+constexpr double kShortestStretch = 0.1;  // [s]
+constexpr double kLeastTravel = 2e-3;     // [m or rad] of a lap
+constexpr double kSearchStep = 20e-3;     // [s] between samples at which a lap may begin
+constexpr std::size_t kShares = 16;       // at which stretches are compared
 
 /// The commanded motion as a curve in the space of the axes.
 class Curve5 {
@@ -153,7 +153,7 @@ class Segmentation {
   }
 
   std::optional<Laps> laps_from(std::size_t begin, std::size_t end) const {
-    const auto shortest = static_cast<std::size_t>(kShortestLap / curve_.period());
+    const auto shortest = static_cast<std::size_t>(kShortestStretch / curve_.period());
     for (std::size_t j = begin + shortest; 2 * j < begin + end; ++j) {
       // Steps are as long as the curve cannot come back in.
       const double away = curve_.distance(begin, static_cast<double>(j));

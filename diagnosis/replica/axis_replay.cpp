@@ -6,9 +6,9 @@
 
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/effect_stage.hpp"
-#include "diagnosis/replica/fingerprint.hpp"
 #include "diagnosis/search/parallel.hpp"
 #include "model/drive/axis_drive.hpp"
+#include "model/fingerprint.hpp"
 #include "model/probe/probe_sensor.hpp"
 
 namespace vcnc {

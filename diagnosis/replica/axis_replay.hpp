@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/replica/commanded_motion.hpp"
+#include "diagnosis/records/commanded_motion.hpp"
 #include "diagnosis/replica/replica.hpp"
 #include "model/drive/axis_drive.hpp"
 #include "model/machine.hpp"

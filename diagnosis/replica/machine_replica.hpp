@@ -33,9 +33,9 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/records/commanded_motion.hpp"
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/axis_replay.hpp"
-#include "diagnosis/replica/commanded_motion.hpp"
 #include "diagnosis/replica/probe_replay.hpp"
 #include "diagnosis/replica/replica.hpp"
 #include "model/geometry/piece.hpp"

@@ -4,20 +4,20 @@
 #include <optional>
 
 #include "diagnosis/replica/effect_stage.hpp"
-#include "diagnosis/replica/fingerprint.hpp"
+#include "model/fingerprint.hpp"
 #include "model/probe/heydemann.hpp"
 #include "model/probe/probe_sensor.hpp"
 
 namespace vcnc {
 namespace {
 
-constexpr std::uint64_t kSeed = 1;        // of noise that a replica does not have
-constexpr double kStep = 1e-3;            // [s]
+constexpr std::uint64_t kProbeSeed = 1;   // of noise that a replica does not have
+constexpr double kProbeStep = 1e-3;       // [s]
 constexpr double kRadiusChange = 1e-3;    // [m] effects change the radius by less than this
 constexpr double kSignalAmplitude = 0.5;  // [V]
 
 Moment moment_of(std::size_t cycle) {
-  return {static_cast<double>(cycle) * kStep, kStep, static_cast<std::int64_t>(cycle)};
+  return {static_cast<double>(cycle) * kProbeStep, kProbeStep, static_cast<std::int64_t>(cycle)};
 }
 
 /// True motion of the axes at the end of a cycle, as the probe module finds it from its samples.
@@ -49,17 +49,17 @@ class CoarseContact {
  public:
   CoarseContact(const Machine& actual, const Piece* piece)
       : probe_(actual.probe),
-        effects_(machine_chain<TouchPort>(actual.effects, kSeed)),
+        effects_(machine_chain<TouchPort>(actual.effects, kProbeSeed)),
         ball_{.radius = probe_.ball_radius},
         piece_(piece),
         mass_(probe_.moving_mass + probe_.stylus_mass) {
     const double w = std::sqrt(probe_.spring_rate / mass_), b = probe_.damping_ratio * w;
     const double square = w * w - b * b;  // of the damped frequency; negative: aperiodic
     const double w_d = std::sqrt(std::abs(square));
-    const double fade = std::exp(-b * kStep);
-    const double c = square > 0 ? std::cos(w_d * kStep) : std::cosh(w_d * kStep);
-    double s = kStep;
-    if (w_d > 0) s = (square > 0 ? std::sin(w_d * kStep) : std::sinh(w_d * kStep)) / w_d;
+    const double fade = std::exp(-b * kProbeStep);
+    const double c = square > 0 ? std::cos(w_d * kProbeStep) : std::cosh(w_d * kProbeStep);
+    double s = kProbeStep;
+    if (w_d > 0) s = (square > 0 ? std::sin(w_d * kProbeStep) : std::sinh(w_d * kProbeStep)) / w_d;
     rr_ = fade * (c + b * s);
     rv_ = fade * s;
     vr_ = -fade * w * w * s;
@@ -69,7 +69,7 @@ class CoarseContact {
   Vec3 step(const ToolPose& pose, std::size_t cycle) {
     if (!effects_.empty()) feel(pose, cycle);
     if (!placed_) place(pose);
-    const Vec3 v_tool = (pose.p_WT - p_tool_) / kStep;
+    const Vec3 v_tool = (pose.p_WT - p_tool_) / kProbeStep;
     const Vec3 r = p_ - p_tool_, w = v_ - v_tool;
     Vec3 p = pose.p_WT + rr_ * r + rv_ * w, v = v_tool + vr_ * r + vv_ * w;
     if (piece_ != nullptr) touch(p, v);
@@ -109,7 +109,7 @@ class CoarseContact {
     if (!surface_.valid || gap >= 0) return;
     const Vec3& n = surface_.n;
     p -= gap * n;
-    const double push = n.dot(p - p_) / kStep - n.dot(v);
+    const double push = n.dot(p - p_) / kProbeStep - n.dot(v);
     v += push * n;
     if (ball_.friction > 0 && push > 0) {
       const Vec3 sliding = v - n * n.dot(v);
@@ -117,7 +117,7 @@ class CoarseContact {
       if (!(speed > 0)) return;
       const Vec3 change = sliding * -std::min(1.0, ball_.friction * push / speed);
       v += change;
-      p += 0.5 * kStep * change;
+      p += 0.5 * kProbeStep * change;
     }
   }
 
@@ -142,7 +142,7 @@ bool corrects_signals(const Machine& actual) {
 class CoarseSignals {
  public:
   CoarseSignals(const Machine& actual, int channel)
-      : errors_(machine_chain<AnaloguePort>(actual.effects, kSeed)),
+      : errors_(machine_chain<AnaloguePort>(actual.effects, kProbeSeed)),
         channel_(channel),
         period_(actual.probe.signal_period),
         corrects_(corrects_signals(actual)) {}
@@ -199,7 +199,7 @@ ProbeReplay replay_probe(const Machine& actual, const Piece* piece, const AxisRe
     replay.ball[c].resize(cycles);
     replay.reading[c].resize(cycles);
   }
-  ProbeSensor sensor(actual, piece, kSeed);
+  ProbeSensor sensor(actual, piece, kProbeSeed);
   for (std::size_t s = kTruthPerCycle - 1; s < samples; ++s) {  // the first is that of instant 0
     AxisVector q;
     for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = axes[i]->truth[s];
@@ -217,7 +217,7 @@ Poses replay_poses(const Machine& actual, const AxisReplays& axes) {
   const std::size_t cycles = axes[0]->cycles();
   Poses poses(cycles);
   const Kinematics kinematics(actual.kinematics, actual.probe.length, actual.setup.work_offset[0]);
-  Chain<PosePort> errors = machine_chain<PosePort>(actual.effects, kSeed);
+  Chain<PosePort> errors = machine_chain<PosePort>(actual.effects, kProbeSeed);
   PosePort::Context<double> context;
   for (std::size_t k = 0; k < cycles; ++k) {
     read_motions(axes, k, context.axes);
@@ -287,9 +287,9 @@ Deflections replay_contact(const Machine& actual, const Piece* piece, NearbyPose
 
 Deflections replay_sensing(const Machine& actual, const Deflections& ball, const AxisReplays& axes,
                            const Deflections* moved) {
-  Chain<DeflectionPort> feeling = machine_chain<DeflectionPort>(actual.effects, kSeed);
+  Chain<DeflectionPort> feeling = machine_chain<DeflectionPort>(actual.effects, kProbeSeed);
   std::array signals{CoarseSignals(actual, 0), CoarseSignals(actual, 1), CoarseSignals(actual, 2)};
-  Chain<ReadingPort> counting = machine_chain<ReadingPort>(actual.effects, kSeed);
+  Chain<ReadingPort> counting = machine_chain<ReadingPort>(actual.effects, kProbeSeed);
   if (feeling.empty() && signals[0].ideal() && counting.empty()) return ball;
   Deflections reading = ball;
   for (std::size_t k = 0; k < ball[0].size(); ++k) {
@@ -316,7 +316,8 @@ Deflections replay_sensing(const Machine& actual, const Deflections& ball, const
 }
 
 bool signals_err(const Machine& actual) {
-  return !corrects_signals(actual) && !machine_chain<AnaloguePort>(actual.effects, kSeed).empty();
+  return !corrects_signals(actual) &&
+         !machine_chain<AnaloguePort>(actual.effects, kProbeSeed).empty();
 }
 
 bool lifts(const Machine& actual) { return !actual.effects.get<ContactLoss>().null(); }
@@ -330,7 +331,7 @@ std::string fingerprint_of_full_probe(const Machine& actual) {
 
 bool poses_follow_dynamics(const Machine& actual) {
   return !actual.effects.get<CrossInertia>().null() ||
-         machine_chain<PosePort>(actual.effects, kSeed).remembers();
+         machine_chain<PosePort>(actual.effects, kProbeSeed).remembers();
 }
 
 std::string fingerprint_of_contact(const Machine& actual) {

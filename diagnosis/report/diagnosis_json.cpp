@@ -31,7 +31,7 @@ Json effect(const FoundEffect& e) {
           {"acquisition", e.acquisition}};
 }
 
-Json figure(const SignalFigure& f) {
+Json figure_json(const SignalFigure& f) {
   const ShownUnit unit = shown_unit(f.channel);
   return {{"signal", channel_name(f.channel)},
           {"run", f.run},
@@ -88,7 +88,7 @@ std::string to_json(const Diagnosis& d, const std::string& source) {
                   {"uncertain", list(d.uncertain, number)},
                   {"law", d.law ? learned(*d.law) : Json()},
                   {"vibrations", d.vibrations},
-                  {"figures", list(d.figures, figure)},
+                  {"figures", list(d.figures, figure_json)},
                   {"ladder", list(d.ladder, rung)},
                   {"excitation", list(d.excitation, excitation)},
                   {"warnings", d.warnings},

@@ -13,7 +13,7 @@ namespace vcnc {
 namespace {
 
 /// Power over the noise around of a line, and of one that makes such a part of all noise.
-constexpr double kLoud = 300, kClear = 60, kPartOfNoise = 0.01;
+constexpr double kLoudLine = 300, kClear = 60, kPartOfNoise = 0.01;
 constexpr double kFrequency = 2;
 /// Part of a frequency within which a line is the same, and times the power that is clearly more.
 constexpr double kSameLine = 0.03, kClearlyMore = 4;
@@ -43,7 +43,7 @@ NoiseLine strongest(const std::vector<NoiseLine>& lines, std::size_t axis,
     }
     return best;
   };
-  const NoiseLine loud = strongest_that([](const NoiseLine& l) { return l.strength >= kLoud; });
+  const NoiseLine loud = strongest_that([](const NoiseLine& l) { return l.strength >= kLoudLine; });
   if (loud.strength > 0) return loud;
   return strongest_that([&](const NoiseLine& line) {
     const std::vector<ComparedChannel>& channels = evidence.replica().channels();
@@ -94,7 +94,7 @@ class ChatterSearch {
     if (c.of_model) return c;
     if (c.has_line() || c.is_restless()) c.causes = causes_of(c);
     // A line that is not loud is news only where the model has it as strongly.
-    if (c.has_line() && c.line.strength < kLoud &&
+    if (c.has_line() && c.line.strength < kLoudLine &&
         (c.causes.empty() || !c.causes.front().as_strong)) {
       c.line = {};
       c.causes = c.is_restless() ? causes_of(c) : std::vector<ChatterCause>{};

@@ -15,11 +15,11 @@ constexpr double kStep = 0.1;            // of a tolerance, to see what a number
 constexpr std::size_t kRemembered = 64;  // series
 
 /// Of what is declared, or in the unit of the key.
-struct Tolerance {
+struct CommonTolerance {
   std::string_view prefix, end;
   double share, size;
 };
-constexpr Tolerance kTolerances[] = {
+constexpr CommonTolerance kCommonTolerances[] = {
     {"probe.damping_ratio", "", 0.5, 0},
     {"axes.", ".current_lag_us", 0.3, 0},
     {"axes.", ".position_lag_us", 0, 500},
@@ -29,8 +29,8 @@ constexpr Tolerance kTolerances[] = {
 };
 
 /// In the unit of the key.
-double tolerance_of(const std::string& key, double value) {
-  for (const Tolerance& t : kTolerances)
+double tolerance_in_common(const std::string& key, double value) {
+  for (const CommonTolerance& t : kCommonTolerances)
     if (key.starts_with(t.prefix) && key.ends_with(t.end)) return t.share * value + t.size;
   return 0;
 }
@@ -43,8 +43,8 @@ std::vector<FreedNumber> common_numbers(const Machine& healthy) {
   Machine copy = healthy;
   std::vector<FreedNumber> all;
   for (const Parameter& p : parameters(copy)) {
-    if (tolerance_of(p.key, 1) <= 0) continue;
-    const double value = number_of(healthy, p.key), tolerance = tolerance_of(p.key, value);
+    if (tolerance_in_common(p.key, 1) <= 0) continue;
+    const double value = number_of(healthy, p.key), tolerance = tolerance_in_common(p.key, value);
     if (tolerance <= 0) continue;
     all.push_back({.number = {.key = std::string(kCommon) + p.key,
                               .typical = tolerance,

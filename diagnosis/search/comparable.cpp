@@ -12,7 +12,7 @@ using Flags = std::vector<std::vector<char>>;
 
 /// An axis stands when its command moved less than this in each of the last and next 25 ms.
 constexpr double kStandingLinear = 0.2e-3, kStandingRotary = 0.2e-3;  // [m/s], [rad/s]
-constexpr double kReach = 0.025;                                      // [s]
+constexpr double kCurveReach = 0.025;                                 // [s]
 /// So long after its last motion nothing but the rounding of its encoder says where it rests.
 constexpr double kSettled = 0.5;  // [s]
 /// Readings are rough where their second differences in that reach are as large, of the usual.
@@ -30,7 +30,7 @@ constexpr double kLever = 0.1;  // of a rotary axis [m]
 
 void mask_standing(const Record& record, const std::vector<ComparedChannel>& channels,
                    Flags& valid) {
-  const auto reach = static_cast<std::size_t>(std::round(kReach / record.period));
+  const auto reach = static_cast<std::size_t>(std::round(kCurveReach / record.period));
   for (std::size_t c = 0; c < valid.size(); ++c) {
     const ComparedChannel& channel = channels[c];
     if (channel.kind != SignalKind::force && channel.kind != SignalKind::twist) continue;
@@ -112,7 +112,7 @@ void mask_touching(const Record& record, const std::vector<ComparedChannel>& cha
   for (std::size_t begin = 0; begin < n && !readings.empty();) {
     std::size_t end = begin;
     while (end < n && free(end)) ++end;
-    if (end - begin > samples(kReach)) {  // shorter: a reading goes through zero
+    if (end - begin > samples(kCurveReach)) {  // shorter: a reading goes through zero
       if (begin > 0) {
         leave_out_about(released(begin));
         leave_out_about(begin);
@@ -166,7 +166,7 @@ void mask_resting_ball(const Record& record, const std::vector<ComparedChannel>&
 
 void mask_turning_drag(const Record& record, const std::vector<ComparedChannel>& channels,
                        const SeriesOfChannels& measured, const Prediction& declared, Flags& valid) {
-  const auto reach = static_cast<std::size_t>(std::round(kReach / record.period));
+  const auto reach = static_cast<std::size_t>(std::round(kCurveReach / record.period));
   const std::size_t n = record.samples();
   std::vector<double> squared_speed(n, 0.0);
   for (std::size_t axis = 0; axis < 3; ++axis) {

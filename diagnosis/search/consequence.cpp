@@ -17,7 +17,7 @@ Difference difference(const Evidence& evidence, const Prediction& a, const Predi
   Difference d;
   if (a[channel].shares(b[channel])) return d;
   const std::vector<double>&x = a[channel], &y = b[channel];
-  for (const Block& block : evidence.partition().blocks)
+  for (const RecordBlock& block : evidence.partition().blocks)
     for (std::size_t k = block.begin; k < block.end; ++k)
       if (const double by = x[k] - y[k]; std::isfinite(by)) d.sum += by * by, d.n += 1;
   return d;

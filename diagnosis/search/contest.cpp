@@ -439,7 +439,7 @@ bool Contest::under_two_conditions(const Contender& c) const {
           .step;
   std::map<int, double> gains;
   for (std::size_t b = 0; b < g0.size(); ++b) {
-    const Block& block = evidence.partition().blocks[b];
+    const RecordBlock& block = evidence.partition().blocks[b];
     if (block.held_out)
       gains[block.condition] += left_after(g0[b], step0) - left_after(g1[b], c.fit.linear_step);
   }

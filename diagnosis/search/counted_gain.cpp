@@ -7,7 +7,7 @@ namespace vcnc {
 namespace {
 
 /// Times what a found law leaves where it explains most, for what it may leave elsewhere.
-constexpr double kElsewhere = 4;
+constexpr double kWorseElsewhere = 4;
 
 /// Part of what an effect explains that it may be wrong by: as much as is believed of any, or less
 /// where it has been seen to be right.
@@ -15,7 +15,7 @@ double wrong_by(double believed, const Explained& explained, const std::vector<d
   const auto most = std::max_element(explained.begin(), explained.end());
   if (most == explained.end() || *most <= 0) return believed;
   const auto channel = static_cast<std::size_t>(most - explained.begin());
-  return std::min(believed, kElsewhere * left[channel] / *most);
+  return std::min(believed, kWorseElsewhere * left[channel] / *most);
 }
 
 }  // namespace

@@ -74,6 +74,12 @@ bool Column::zero() const {
   return true;
 }
 
+std::vector<const Column*> pointers(const std::vector<Column>& columns) {
+  std::vector<const Column*> all;
+  for (const Column& c : columns) all.push_back(&c);
+  return all;
+}
+
 Column less(const Column& z, const std::vector<Column>& columns, const Eigen::VectorXd& step) {
   Column::Channels left(z.size());
   for (std::size_t c = 0; c < z.size(); ++c) {
@@ -272,7 +278,7 @@ void Evidence::count_valid() {
     const std::size_t order = std::max(noise.filter.a.size(), noise.once.a.size());
     fitted_count_.push_back(0);
     held_out_count_.push_back(0);
-    for (const Block& block : partition_.blocks) {
+    for (const RecordBlock& block : partition_.blocks) {
       double& count = block.held_out ? held_out_count_[c] : fitted_count_[c];
       std::size_t run = 0;  // valid samples before k
       for (std::size_t k = block.begin; k-- > 0 && run < order && raw_valid_[c][k];) ++run;
@@ -343,7 +349,7 @@ std::vector<float> Evidence::whiten(std::size_t channel, const std::vector<doubl
   const std::vector<char>& valid = valid_[channel];
   std::vector<float> z(series.size(), 0.0F);
   double v[kAtATime];
-  for (const Block& block : partition_.blocks) {
+  for (const RecordBlock& block : partition_.blocks) {
     const WhiteningFilter& filter = block.once ? noise.once : noise.filter;
     const double per_scale = 1 / filter.scale;
     for (std::size_t k = block.begin; k < block.end;) {
@@ -435,7 +441,7 @@ double Evidence::scatter(std::size_t channel, Role role) const {
 double Evidence::chi2(const Column& column, std::size_t channel, Role role) const {
   double sum = 0;
   if (column[channel].empty()) return 0;
-  for (const Block& block : partition_.blocks) {
+  for (const RecordBlock& block : partition_.blocks) {
     if (!takes(block, role)) continue;
     for (std::size_t k = block.begin; k < block.end; ++k) {
       const double z = static_cast<double>(column[channel][k]);
@@ -459,7 +465,7 @@ std::vector<double> Evidence::chi2_of(const Column& column, Role role) const {
 
 double Evidence::rms_of(const std::vector<double>& series, std::size_t channel, Role role) const {
   double sum = 0, n = 0;
-  for (const Block& block : partition_.blocks) {
+  for (const RecordBlock& block : partition_.blocks) {
     if (!takes(block, role)) continue;
     for (std::size_t k = block.begin; k < block.end; ++k) {
       if (!raw_valid_[channel][k] || !std::isfinite(series[k])) continue;
@@ -483,7 +489,7 @@ std::vector<double> Evidence::rms_within_laps(const Prediction& prediction, Role
   mask(off);
   if (!per_shift_.empty() && partition_.repeated)
     take_out_shifts(partition_.stretches, per_shift_, off, Shifts::constant);
-  for (const Block& block : partition_.blocks)
+  for (const RecordBlock& block : partition_.blocks)
     for (std::size_t c = 0; block.once && c < off.size(); ++c)
       std::fill(off[c].begin() + static_cast<std::ptrdiff_t>(block.begin),
                 off[c].begin() + static_cast<std::ptrdiff_t>(block.end), kMissing);
@@ -493,7 +499,7 @@ std::vector<double> Evidence::rms_within_laps(const Prediction& prediction, Role
 }
 
 void Evidence::add_products(const std::vector<const Column*>& columns, std::size_t channel,
-                            const Block& block, Eigen::MatrixXd& to) {
+                            const RecordBlock& block, Eigen::MatrixXd& to) {
   std::vector<std::size_t> present;
   for (std::size_t i = 0; i < columns.size(); ++i)
     if (!(*columns[i])[channel].empty()) present.push_back(i);
@@ -527,7 +533,7 @@ RoleGrams Evidence::products(const std::vector<const Column*>& columns) const {
   const auto m = static_cast<Eigen::Index>(columns.size());
   RoleGrams all = RoleGrams::none(m, m, valid_.size());
   parallel_for(valid_.size(), [&](std::size_t c) {
-    for (const Block& block : partition_.blocks)
+    for (const RecordBlock& block : partition_.blocks)
       add_products(columns, c, block, block.held_out ? all.held_out_of[c] : all.fitted_of[c]);
   });
   for (std::size_t c = 0; c < valid_.size(); ++c) {
@@ -548,7 +554,7 @@ RoleGrams Evidence::cross(const std::vector<const Column*>& a,
       for (std::size_t i = 0; i < a.size(); ++i) {
         const std::vector<float>& x = (*a[i])[c];
         if (x.empty()) continue;
-        for (const Block& block : partition_.blocks)
+        for (const RecordBlock& block : partition_.blocks)
           (block.held_out ? all.held_out_of : all.fitted_of)[c](static_cast<Eigen::Index>(i),
                                                                 static_cast<Eigen::Index>(j)) +=
               dot(&x[block.begin], &y[block.begin], block.end - block.begin);

@@ -50,6 +50,9 @@ class Column {
   std::shared_ptr<const Channels> channels_;
 };
 
+/// Where each is, for what takes products of them.
+std::vector<const Column*> pointers(const std::vector<Column>& columns);
+
 /// z less the sum of step_i columns_i.
 Column less(const Column& z, const std::vector<Column>& columns, const Eigen::VectorXd& step);
 
@@ -156,7 +159,7 @@ class Evidence {
   RoleGrams cross(const std::vector<const Column*>& a, const std::vector<const Column*>& b) const;
 
  private:
-  bool takes(const Block& block, Role role) const {
+  bool takes(const RecordBlock& block, Role role) const {
     return role == Role::both || block.held_out == (role == Role::held_out);
   }
   std::vector<float> whiten(std::size_t channel, const std::vector<double>& series) const;
@@ -180,7 +183,7 @@ class Evidence {
   void mask(SeriesOfChannels& series) const;
   /// Adds the products in one block and channel.
   static void add_products(const std::vector<const Column*>& columns, std::size_t channel,
-                           const Block& block, Eigen::MatrixXd& to);
+                           const RecordBlock& block, Eigen::MatrixXd& to);
 
   const Record& record_;
   Replica& replica_;

@@ -12,7 +12,7 @@ namespace vcnc {
 namespace {
 
 /// Takes over what a refit found and computes everything at it.
-void settle(const Evidence& evidence, FittedMachine& m, const Refit& f) {
+void settle_from(const Evidence& evidence, FittedMachine& m, const Refit& f) {
   m.machine = f.machine;
   for (AddedEffect& a : m.added) adopt(a.numbers, f.live);
   adopt(m.nuisances.numbers, f.linear);
@@ -25,7 +25,7 @@ void settle(const Evidence& evidence, FittedMachine& m, const Refit& f) {
 }
 
 /// Times its noise that a channel may be off before it loses weight.
-constexpr double kLoud = 2;
+constexpr double kLoudChannel = 2;
 
 /// Weight of each channel: one that is far off tells of something missing, not of the numbers that
 /// are there, and would pull them anywhere. (As if its noise were what it is off.)
@@ -33,7 +33,7 @@ std::vector<double> weights(const Evidence& evidence, const Column& residual) {
   std::vector<double> all(residual.size(), 1.0);
   for (std::size_t c = 0; c < all.size(); ++c) {
     const double off = evidence.chi2(residual, c, Role::fitted);
-    const double expected = kLoud * kLoud * evidence.count(c, Role::fitted);
+    const double expected = kLoudChannel * kLoudChannel * evidence.count(c, Role::fitted);
     if (off > expected) all[c] = expected / off;
   }
   return all;
@@ -89,7 +89,7 @@ bool step_towards(const Evidence& evidence, FittedMachine& m, const Refit& f,
     part.live = between(old, f.live, share);
     part.machine = with(with(m.machine, part.live), part.linear);
     FittedMachine trial = m;
-    settle(evidence, trial, part);
+    settle_from(evidence, trial, part);
     return trial;
   };
   const auto misfit_of = [&](const FittedMachine& trial) {

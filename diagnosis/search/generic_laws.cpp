@@ -145,7 +145,7 @@ class Laws {
 
   Series knots(const Law& law) const {
     Series values;
-    for (const Block& block : evidence_.partition().blocks)
+    for (const RecordBlock& block : evidence_.partition().blocks)
       for (std::size_t k = block.begin; k < block.end; ++k)
         if (const double v = covariate(law.over, law.over_axis, k); std::isfinite(v))
           values.push_back(v);

@@ -79,7 +79,7 @@ std::map<std::string, Interval> intervals_of(const Evidence& evidence, const Fit
 
   std::map<std::size_t, Eigen::VectorXd> of_block, of_condition, of_lap;
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    const Block& block = evidence.partition().blocks[b];
+    const RecordBlock& block = evidence.partition().blocks[b];
     const Eigen::VectorXd score = blocks[b].block(1, 0, n, 1);
     const auto add = [&](std::map<std::size_t, Eigen::VectorXd>& clusters, std::size_t cluster) {
       const auto [at, first] = clusters.try_emplace(cluster, score);

@@ -11,7 +11,7 @@ namespace {
 constexpr double kEvent = 40, kFaded = 4;  // times what laps usually differ by
 constexpr double kClip = 8;                // of the same, not usual any more
 constexpr double kMost = 0.02;             // of all samples
-constexpr double kReach = 0.05;            // [s]
+constexpr double kEventReach = 0.05;       // [s]
 constexpr int kClippings = 10;
 
 /// Laps of one condition, and how far the one that differs most from their mean is off it.
@@ -73,7 +73,7 @@ std::vector<std::pair<std::size_t, std::size_t>> events(const std::vector<double
 std::vector<LapEvent> lap_events(const Partition& partition, double period,
                                  const std::vector<ComparedChannel>& channels,
                                  const SeriesOfChannels& difference) {
-  const auto reach = static_cast<std::size_t>(std::round(kReach / period));
+  const auto reach = static_cast<std::size_t>(std::round(kEventReach / period));
   std::vector<LapEvent> all;
   for (std::size_t c = 0; c < channels.size(); ++c) {
     if (channels[c].kind == SignalKind::deflection) continue;

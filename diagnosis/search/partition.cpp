@@ -43,7 +43,7 @@ std::vector<std::vector<Stretch>> Partition::repetitions() const {
 
 std::size_t Partition::conditions() const {
   std::set<int> all;
-  for (const Block& b : blocks) all.insert(b.condition);
+  for (const RecordBlock& b : blocks) all.insert(b.condition);
   return all.size();
 }
 

@@ -15,7 +15,7 @@
 namespace vcnc {
 
 /// At most a second of one stretch.
-struct Block {
+struct RecordBlock {
   std::size_t begin = 0, end = 0;  ///< samples [begin, end)
   std::size_t stretch = 0;         ///< index into the stretches of the partition
   int condition = 0;
@@ -24,9 +24,9 @@ struct Block {
 };
 
 struct Partition {
-  std::vector<Stretch> stretches;  ///< of the record, or made up where nothing is repeated
-  std::vector<Block> blocks;       ///< in order of time
-  bool repeated = false;           ///< some condition was run more than once
+  std::vector<Stretch> stretches;   ///< of the record, or made up where nothing is repeated
+  std::vector<RecordBlock> blocks;  ///< in order of time
+  bool repeated = false;            ///< some condition was run more than once
 
   std::size_t conditions() const;
   /// Whether a stretch was run once, though others were repeated.

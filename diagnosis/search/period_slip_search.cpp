@@ -8,20 +8,20 @@ namespace {
 
 using Series = std::vector<double>;
 
-constexpr std::size_t kReach = 5;  // samples on either side
-constexpr double kOff = 0.15;      // of a period
+constexpr std::size_t kSlipReach = 5;  // samples on either side
+constexpr double kOff = 0.15;          // of a period
 constexpr double kQuietBeside = 0.3;
 
 /// Mean of the samples from k on less the mean of those before; NaN where one is missing.
 double step_at(const Series& r, std::size_t k) {
   double step = 0;
-  for (std::size_t i = 0; i < kReach; ++i) step += r[k + i] - r[k - 1 - i];
-  return step / kReach;
+  for (std::size_t i = 0; i < kSlipReach; ++i) step += r[k + i] - r[k - 1 - i];
+  return step / kSlipReach;
 }
 
 /// Whether the reading hardly moves from sample to sample but from k - 1 to k.
 bool sudden(const Series& r, std::size_t k, double most) {
-  for (std::size_t i = k + 1 - kReach; i < k + kReach; ++i)
+  for (std::size_t i = k + 1 - kSlipReach; i < k + kSlipReach; ++i)
     if (i != k && !(std::abs(r[i] - r[i - 1]) < most)) return false;
   return true;
 }
@@ -86,7 +86,7 @@ std::optional<PeriodSlip> find_period_slip(const Record& record,
   std::optional<PeriodSlip> found;
   for (std::size_t c = 0; c < residual.size(); ++c) {
     const Series& r = residual[c];
-    for (std::size_t k = kReach; k + kReach <= r.size(); ++k) {
+    for (std::size_t k = kSlipReach; k + kSlipReach <= r.size(); ++k) {
       const int n = periods_in(r[k] - r[k - 1], period);
       if (n == 0 || !sudden(r, k, kQuietBeside * period) ||
           periods_in(step_at(r, k), period) != n || !stays(record, r, k, n * period) ||

@@ -14,12 +14,6 @@ std::vector<FreedNumber> moved(std::vector<FreedNumber> numbers, const Eigen::Ve
   return numbers;
 }
 
-std::vector<const Column*> pointers(const std::vector<Column>& columns) {
-  std::vector<const Column*> all;
-  for (const Column& c : columns) all.push_back(&c);
-  return all;
-}
-
 /// Products of [z, J..., N...] of which those of the N with each other are computed once.
 class Products {
  public:

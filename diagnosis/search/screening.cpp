@@ -16,12 +16,6 @@ Eigen::VectorXd padded(const Eigen::VectorXd& v, Eigen::Index more) {
   return out;
 }
 
-std::vector<const Column*> pointers(const std::vector<Column>& columns) {
-  std::vector<const Column*> all;
-  for (const Column& c : columns) all.push_back(&c);
-  return all;
-}
-
 std::vector<Column> unpacked(const std::vector<PackedColumn>& columns) {
   std::vector<Column> all;
   for (const PackedColumn& c : columns) all.push_back(c.unpacked());

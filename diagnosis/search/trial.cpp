@@ -19,7 +19,7 @@ std::size_t phase_of(const Candidate& c) {
   return c.numbers.size();
 }
 
-bool contains(const std::string& text, const char* part) {
+bool has_part(const std::string& text, const char* part) {
   return text.find(part) != std::string::npos;
 }
 
@@ -27,7 +27,7 @@ bool contains(const std::string& text, const char* part) {
 /// direction of one, A cos(n (theta - psi)).
 double periods_per_turn(const Candidate& c, const Trial& trial) {
   for (std::size_t i = 0; i < c.numbers.size(); ++i)
-    if (contains(c.numbers[i].key, ".lobes")) return trial.values[i];
+    if (has_part(c.numbers[i].key, ".lobes")) return trial.values[i];
   return 1;
 }
 
@@ -36,17 +36,17 @@ double periods_per_turn(const Candidate& c, const Trial& trial) {
 bool is_fixed(const FreeNumber& n) {
   if (n.whole) return true;
   for (const char* part : {".reference_", ".rest_", ".expansion_", ".channel"})
-    if (contains(n.key, part)) return true;
+    if (has_part(n.key, part)) return true;
   return false;
 }
 
 bool is_phase(const FreeNumber& n) {
-  return contains(n.key, ".phase_") || contains(n.key, ".weight_imbalance.angle_");
+  return has_part(n.key, ".phase_") || has_part(n.key, ".weight_imbalance.angle_");
 }
 
-bool has_no_phase(const FreeNumber& n) { return contains(n.key, "_bow_"); }
+bool has_no_phase(const FreeNumber& n) { return has_part(n.key, "_bow_"); }
 
-bool is_limit(const FreeNumber& n) { return contains(n.key, ".range_clip.limit_"); }
+bool is_limit(const FreeNumber& n) { return has_part(n.key, ".range_clip.limit_"); }
 
 std::vector<Trial> trials(const Machine& base, const std::vector<Candidate>& candidates,
                           const TrialValues& trial_values) {

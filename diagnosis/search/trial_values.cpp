@@ -66,7 +66,7 @@ double share_of_samples(const Record& record) {
 std::vector<std::size_t> fitted_samples(const Evidence& evidence, double share) {
   constexpr double kGolden = 0.6180339887498949;
   std::vector<std::size_t> samples;
-  for (const Block& block : evidence.partition().blocks)
+  for (const RecordBlock& block : evidence.partition().blocks)
     for (std::size_t k = block.begin; k < block.end && !block.held_out; ++k) {
       const double turn = kGolden * static_cast<double>(k);
       if (turn - std::floor(turn) <= share) samples.push_back(k);
@@ -240,7 +240,7 @@ std::vector<double> TrialValuesOf::find_ringing(const Column& residual) const {
     for (std::size_t c = 0; c < residual.size(); ++c) {
       const std::vector<float>& z = residual[c];
       if (evidence_->replica().channels()[c].kind != SignalKind::deflection || z.empty()) continue;
-      for (const Block& block : evidence_->partition().blocks) {
+      for (const RecordBlock& block : evidence_->partition().blocks) {
         if (block.held_out) continue;
         const double window = 2 * kPi / static_cast<double>(block.end - block.begin);
         const std::complex<double> turn = std::polar(1.0, w), slow = std::polar(1.0, window);

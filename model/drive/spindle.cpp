@@ -14,7 +14,7 @@ constexpr double kManyTurns = 1000;   // are not counted one by one
 constexpr double kOrientGain = 60;    // [1/s]
 constexpr double kOrientedAngle = 1e-4, kOrientedSpeed = 1e-2;
 
-double wrap(double angle) {
+double wrapped_turn(double angle) {
   angle = std::fmod(angle, 2 * kPi);
   return angle < 0 ? angle + 2 * kPi : angle;
 }
@@ -26,7 +26,7 @@ SpindleDrive::SpindleDrive(const SpindleParams& params) : params_(params) {}
 // Speed that brings the spindle to the orientation angle.
 double SpindleDrive::toward_angle() const {
   const double brake = kOrientShare * params_.acceleration;
-  double ahead = wrap(params_.orient_angle - angle_);  // distance in positive direction
+  double ahead = wrapped_turn(params_.orient_angle - angle_);  // distance in positive direction
   const double stopping = speed_ * speed_ / (2 * kReachShare * params_.acceleration);
   const bool slow = std::abs(speed_) < kOrientGain * kPi / 4;
   if (slow ? ahead > kPi : speed_ < 0) ahead -= 2 * kPi;
@@ -68,12 +68,12 @@ SpindleCycle SpindleDrive::step(SpindleMode mode, double speed) {
     const double most = params_.acceleration * kDriveLoopTime;
     const double before = speed_;
     speed_ += std::clamp(target - speed_, -most, most);
-    angle_ = wrap(angle_ + 0.5 * (before + speed_) * kDriveLoopTime);
+    angle_ = wrapped_turn(angle_ + 0.5 * (before + speed_) * kDriveLoopTime);
   }
   if (mode == SpindleMode::orient) {
-    const double off = wrap(params_.orient_angle - angle_ + kPi) - kPi;
+    const double off = wrapped_turn(params_.orient_angle - angle_ + kPi) - kPi;
     if (std::abs(off) < kOrientedAngle && std::abs(speed_) < kOrientedSpeed) {
-      angle_ = wrap(params_.orient_angle);
+      angle_ = wrapped_turn(params_.orient_angle);
       speed_ = 0;
       cycle.oriented = true;
     }

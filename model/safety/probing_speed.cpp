@@ -11,7 +11,7 @@
 namespace vcnc {
 namespace {
 
-constexpr double kSampleTime = 100e-6;
+constexpr double kSampleStep = 100e-6;
 constexpr int kInstants = 16;  ///< of the braking that are looked at, besides the ends of the axes
 
 /// Bounds of a deflection by the way w: laterally and axially.
@@ -38,7 +38,7 @@ double stopping_distance(double speed, double reaction_time, double deceleration
 ProbingLimit::ProbingLimit(const Machine& machine, double reaction_time)
     : kinematics_(machine.kinematics, machine.probe.length, Vec3::Zero()),
       reaction_time_(reaction_time),
-      countable_(machine.probe.signal_period / (2 * kSampleTime)) {
+      countable_(machine.probe.signal_period / (2 * kSampleStep)) {
   for (std::size_t i = 0; i < kAxisCount; ++i)
     deceleration_[i] = machine.axes[i].limits.acceleration;
   const ProbeParams& probe = machine.probe;

@@ -8,7 +8,7 @@
 
 #include "model/math.hpp"
 
-namespace vcnc {
+namespace vcnc::circular_test {
 namespace {
 
 std::vector<CircularPoint> circle(const std::function<double(double)>& dR, int n = 3600) {
@@ -68,4 +68,4 @@ TEST(Circular, PartOfACircleIsRefused) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::circular_test

@@ -10,7 +10,7 @@
 #include "scratch.hpp"
 #include "synthetic.hpp"
 
-namespace vcnc {
+namespace vcnc::compare_test {
 namespace {
 
 using synthetic::SyntheticRun;
@@ -132,4 +132,4 @@ TEST(Compare, PageIsSelfContainedAndEscaped) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::compare_test

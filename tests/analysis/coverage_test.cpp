@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace vcnc {
+namespace vcnc::coverage_test {
 namespace {
 
 using Bin = Coverage::Bin;
@@ -74,4 +74,4 @@ TEST(Coverage, LaterBadPassDoesNotTakeAwayWhatWasMeasured) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::coverage_test

@@ -4,7 +4,7 @@
 
 #include "synthetic.hpp"
 
-namespace vcnc {
+namespace vcnc::dynamic_error_test {
 namespace {
 
 using synthetic::SyntheticRun;
@@ -130,4 +130,4 @@ TEST_F(OnTheWall, TrunnionAndHeadAgree) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::dynamic_error_test

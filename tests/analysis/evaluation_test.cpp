@@ -4,7 +4,7 @@
 
 #include "synthetic.hpp"
 
-namespace vcnc {
+namespace vcnc::evaluation_test {
 namespace {
 
 using synthetic::no_error;
@@ -240,4 +240,4 @@ TEST(Evaluation, RingRadiusErrorIsFoundInBothSenses) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::evaluation_test

@@ -7,7 +7,7 @@
 
 #include "model/math.hpp"
 
-namespace vcnc {
+namespace vcnc::features_test {
 namespace {
 
 /// A signal over a full turn in `n` steps, counter-clockwise or clockwise.
@@ -114,4 +114,4 @@ TEST(Features, GrowthWithTheSpeed) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::features_test

@@ -17,7 +17,7 @@
 
 #include "scratch.hpp"
 
-namespace vcnc {
+namespace vcnc::recording_test {
 namespace {
 
 TelemetryRow numbered(int k) {
@@ -278,4 +278,4 @@ TEST(Recording, CsvHoldsEveryNumberExactly) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::recording_test

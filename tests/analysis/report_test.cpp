@@ -12,7 +12,7 @@
 #include "scratch.hpp"
 #include "synthetic.hpp"
 
-namespace vcnc {
+namespace vcnc::report_test {
 namespace {
 
 using synthetic::SyntheticRun;
@@ -119,4 +119,4 @@ TEST(Envelope, KeepsEveryExtremeAndShowsGaps) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::report_test

@@ -9,7 +9,7 @@
 #include "analysis/recording.hpp"
 #include "scratch.hpp"
 
-namespace vcnc {
+namespace vcnc::seal_test {
 namespace {
 
 std::string bytes_of(const std::filesystem::path& path) {
@@ -129,4 +129,4 @@ TEST(Recording, CutOffIsRefusedInOneSentence) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::seal_test

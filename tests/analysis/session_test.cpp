@@ -9,7 +9,7 @@
 #include "scratch.hpp"
 #include "synthetic.hpp"
 
-namespace vcnc {
+namespace vcnc::session_test {
 namespace {
 
 using synthetic::SyntheticRun;
@@ -127,4 +127,4 @@ TEST(AnalysisSession, UnusableFolderIsOneClearError) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::session_test

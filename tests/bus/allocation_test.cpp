@@ -25,7 +25,7 @@ std::atomic<std::uint64_t> allocations = 0;
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
-namespace vcnc {
+namespace vcnc::allocation_test {
 namespace {
 
 class Drive : public Node {
@@ -79,4 +79,4 @@ TEST(Allocation, NoneInTheCycleAfterWarmUp) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::allocation_test

@@ -12,7 +12,7 @@
 #include "bus/wire_docs.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::canopen_device_test {
 namespace {
 
 constexpr Tick kPeriod = 100;
@@ -411,4 +411,4 @@ TEST(BusOff, AShortDisturbanceOnlyMakesItPassive) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::canopen_device_test

@@ -9,7 +9,7 @@
 #include "bus/run_node.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::degraded_test {
 namespace {
 
 /// Takes `after` more cycles from the first loss on.
@@ -200,4 +200,4 @@ TEST(RunNode, GivesUpOnANodeThatNeverRests) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::degraded_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace vcnc {
+namespace vcnc::error_counters_test {
 namespace {
 
 using State = ErrorCounters::State;
@@ -76,4 +76,4 @@ TEST(ErrorCounters, ReturnsAfter128SequencesOf11RecessiveBits) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::error_counters_test

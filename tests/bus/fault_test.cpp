@@ -15,7 +15,7 @@
 #include "bus/run_node.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::fault_test {
 namespace {
 
 using Kind = BusFault::Kind;
@@ -413,4 +413,4 @@ TEST(FaultDocs, ThePageInDocsIsTheGeneratedOne) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::fault_test

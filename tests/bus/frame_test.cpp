@@ -6,7 +6,7 @@
 
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::frame_test {
 namespace {
 
 TEST(Frame, ValidLengthsAreThoseOfTheStandard) {
@@ -50,4 +50,4 @@ TEST(Frame, SortIsStableAndAgreesWithTheLibrary) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::frame_test

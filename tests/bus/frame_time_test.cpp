@@ -8,7 +8,7 @@
 #include "bus/timed_bus.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::frame_time_test {
 namespace {
 
 constexpr BitRates k1And5{1e6, 5e6}, k1And8{1e6, 8e6};
@@ -170,4 +170,4 @@ TEST(FrameTime, LoadIsTheSumOfTheFrames) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::frame_time_test

@@ -17,7 +17,7 @@
 #include "bus/run_node.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::hub_test {
 namespace {
 
 constexpr int kNodes = 5;
@@ -403,4 +403,4 @@ TEST(OpenTransport, UnknownSchemesAreRefused) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::hub_test

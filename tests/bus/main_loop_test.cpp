@@ -9,7 +9,7 @@
 #include "bus/trace_hash.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::main_loop_test {
 namespace {
 
 /// Keeps every cycle's frames.
@@ -229,4 +229,4 @@ TEST(Barrier, RosterIsChecked) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::main_loop_test

@@ -6,7 +6,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace vcnc {
+namespace vcnc::memory_slot_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -119,4 +119,4 @@ TEST(MemorySlot, RandomTearsNeverGiveAMixture) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::memory_slot_test

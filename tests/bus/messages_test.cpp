@@ -9,7 +9,7 @@
 
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::messages_test {
 namespace {
 
 using Bytes = std::vector<int>;
@@ -306,4 +306,4 @@ TEST(Messages, SyncCounterRunsFrom1To240) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::messages_test

@@ -2,7 +2,7 @@
 
 #include "bus/node_shell.hpp"
 
-namespace vcnc {
+namespace vcnc::node_shell_limits_test {
 namespace {
 
 /// Counts what it is handed.
@@ -36,4 +36,4 @@ TEST(NodeShell, FramesWithoutASyncDoNotPileUp) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::node_shell_limits_test

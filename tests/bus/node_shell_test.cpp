@@ -6,7 +6,7 @@
 
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::node_shell_test {
 namespace {
 
 /// A node that writes down what it was given.
@@ -227,4 +227,4 @@ TEST(NodeShell, RandomFramesNeverUpsetIt) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::node_shell_test

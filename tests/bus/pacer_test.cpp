@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace vcnc {
+namespace vcnc::pacer_test {
 namespace {
 
 TEST(Pacer, FreeRunningNeverWaits) {
@@ -44,4 +44,4 @@ TEST(Pacer, SpeedIsChecked) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::pacer_test

@@ -6,7 +6,7 @@
 #include "bus/sdo_server.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::sdo_test {
 namespace {
 
 using Bytes8 = std::array<std::uint8_t, 8>;
@@ -310,4 +310,4 @@ TEST(ObjectDictionary, RefusesAMistakenTable) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::sdo_test

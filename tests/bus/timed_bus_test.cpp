@@ -6,7 +6,7 @@
 
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::timed_bus_test {
 namespace {
 
 TEST(TimedBus, LowestIdentifierWinsAndNothingIsInterrupted) {
@@ -62,4 +62,4 @@ TEST(TimedBus, AgreesWithTheDefinition) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::timed_bus_test

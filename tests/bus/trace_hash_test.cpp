@@ -4,7 +4,7 @@
 
 #include <set>
 
-namespace vcnc {
+namespace vcnc::trace_hash_test {
 namespace {
 
 Frame sample() {
@@ -58,4 +58,4 @@ TEST(TraceHash, AskingDoesNotChangeIt) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::trace_hash_test

@@ -10,7 +10,7 @@
 
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::truth_test {
 namespace {
 
 TruthCycle cycle(Tick k, std::size_t axis) {
@@ -143,4 +143,4 @@ TEST(TruthSocket, PathsThatCannotBeAreRefused) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::truth_test

@@ -10,7 +10,7 @@
 
 #include "bus/frame.hpp"
 
-namespace vcnc {
+namespace vcnc::wire_docs_test {
 namespace {
 
 TEST(WireDocs, FieldsLieInsideTheirMessageWithoutOverlap) {
@@ -83,4 +83,4 @@ TEST(WireDocs, PageInDocsIsCurrent) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::wire_docs_test

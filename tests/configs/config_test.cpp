@@ -7,7 +7,7 @@
 #include <fstream>
 #include <functional>
 
-namespace vcnc {
+namespace vcnc::config_test {
 namespace {
 
 const std::string kMachines = std::string(VCNC_SOURCE_DIR) + "/configs/machines/";
@@ -207,17 +207,17 @@ TEST(Config, RefusesUncertaintiesOfWhatThereIsNotAndBoundsWithoutTheValue) {
     return error_of([&] { parse_machine("name = \"m\"\n[[uncertainty]]\n" + lines, "m.toml"); });
   };
   const std::string kv = "key = \"axes.X.kv_per_s\"\n";
-  EXPECT_EQ(error_with("standard = 1\n"), "m.toml: uncertainty: key is missing");
+  EXPECT_EQ(error_with("standard = 1\n"), "m.toml:2: uncertainty: key is missing");
   EXPECT_EQ(error_with("key = \"axes.X.kv\"\n"),
-            "m.toml: uncertainty: axes.X.kv is not a number of a machine file; did you mean "
+            "m.toml:2: uncertainty: axes.X.kv is not a number of a machine file; did you mean "
             "axes.X.kv_per_s?");
   EXPECT_EQ(error_with(kv + "between = [50, 20]\n"),
-            "m.toml: uncertainty: axes.X.kv_per_s: between: expected [least, most]");
+            "m.toml:2: uncertainty: axes.X.kv_per_s: between: expected [least, most]");
   EXPECT_NE(error_with(kv + "between = [500, 600]\n").find("is declared, which is not between 500"),
             std::string::npos);
   EXPECT_NE(error_with(kv + "between = [-5, 600]\n").find("between: allowed "), std::string::npos);
   EXPECT_EQ(error_with(kv + "[[uncertainty]]\n" + kv),
-            "m.toml: uncertainty: axes.X.kv_per_s is given twice");
+            "m.toml:4: uncertainty: axes.X.kv_per_s is given twice");
   EXPECT_EQ(error_with(kv + "standard = -1\n").find("m.toml:4: uncertainty.standard: -1 is out of"),
             0u);
 }
@@ -343,4 +343,4 @@ TEST(Config, KeyReferenceInDocsIsCurrent) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::config_test

@@ -4,7 +4,7 @@
 
 #include "configs/config.hpp"
 
-namespace vcnc {
+namespace vcnc::idle_effects_test {
 namespace {
 
 std::string idle(const std::string& effects, const std::string& setup = "piece = \"p.toml\"") {
@@ -47,4 +47,4 @@ TEST(IdleEffects, AContactNeedsAPiece) {
 TEST(IdleEffects, NothingIsSaidOfNothing) { EXPECT_EQ(idle("", ""), ""); }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::idle_effects_test

@@ -4,7 +4,7 @@
 
 #include "configs/config.hpp"
 
-namespace vcnc {
+namespace vcnc::import_map_test {
 namespace {
 
 constexpr const char* kSound = R"(
@@ -109,4 +109,4 @@ TEST(ImportMap, EveryKeyIsInTheReference) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::import_map_test

@@ -6,7 +6,7 @@
 
 #include "configs/config.hpp"
 
-namespace vcnc {
+namespace vcnc::scenario_test {
 namespace {
 
 std::string refusal(const std::string& toml) {
@@ -94,4 +94,4 @@ TEST(Scenario, TheReferenceShowsEveryKey) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::scenario_test

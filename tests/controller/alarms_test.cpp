@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-namespace vcnc {
+namespace vcnc::alarms_test {
 namespace {
 
 TEST(Alarms, EveryAlarmHasANumberATextACauseAndARemedy) {
@@ -31,4 +31,4 @@ TEST(Alarms, ThePageIsTheTable) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::alarms_test

@@ -11,7 +11,7 @@
 #include "controller/player.hpp"
 #include "tests/controller/program_file.hpp"
 
-namespace vcnc {
+namespace vcnc::block_search_test {
 namespace {
 
 Machine milling_machine(const std::string& name) {
@@ -135,4 +135,4 @@ TEST(BlockSearch, KnowsTheModesThere) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::block_search_test

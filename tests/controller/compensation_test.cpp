@@ -8,7 +8,7 @@
 #include <functional>
 #include <vector>
 
-namespace vcnc {
+namespace vcnc::compensation_test {
 namespace {
 
 constexpr double kUm = 1e-6, kNm = 1e-9;
@@ -364,4 +364,4 @@ TEST(Compensation, NothingIsSentBeyondTheTravel) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::compensation_test

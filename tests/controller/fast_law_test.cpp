@@ -11,7 +11,7 @@
 #include "controller/planner.hpp"
 #include "planned_moves.hpp"
 
-namespace vcnc {
+namespace vcnc::fast_law_test {
 namespace {
 
 using Dynamics = NcParams::Dynamics;
@@ -149,4 +149,4 @@ TEST(FastLaw, WithTheProbeNothingIsFasterThanACrashAllows) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::fast_law_test

@@ -10,7 +10,7 @@
 #include "controller/planner.hpp"
 #include "tests/controller/planned_moves.hpp"
 
-namespace vcnc {
+namespace vcnc::jerk_bound_test {
 namespace {
 
 constexpr double kV = 0.5, kA = 5, kJ = 50;  ///< of planned_moves.hpp
@@ -143,4 +143,4 @@ TEST(JerkBound, NoPlannedMotionIsShorter) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::jerk_bound_test

@@ -7,7 +7,7 @@
 
 #include "controller/retract.hpp"
 
-namespace vcnc {
+namespace vcnc::nc_record_test {
 namespace {
 
 NcRecord sample() {
@@ -86,4 +86,4 @@ TEST(NcRecord, AProbeThatTouchedIsDrivenOffByHand) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::nc_record_test

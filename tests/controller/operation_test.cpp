@@ -12,7 +12,7 @@
 #include "tests/controller/program_file.hpp"
 #include "tests/controller/random_program.hpp"
 
-namespace vcnc {
+namespace vcnc::operation_test {
 namespace {
 
 Machine milling_machine(const std::string& name) {
@@ -380,4 +380,4 @@ TEST(FeedOverride, APlaceIsFoundAgainByAPlayerWithoutOperator) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::operation_test

@@ -11,7 +11,7 @@
 #include "tests/bench/jerk_bound.hpp"
 #include "tests/controller/planned_moves.hpp"
 
-namespace vcnc {
+namespace vcnc::path_corner_test {
 namespace {
 
 using Shape = PathCorner::Shape;
@@ -156,4 +156,4 @@ TEST(PathCorner, NoArcIsRoundedNextToAnother) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::path_corner_test

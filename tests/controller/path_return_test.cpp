@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-namespace vcnc {
+namespace vcnc::path_return_test {
 namespace {
 
 TEST(PathReturn, ReversesARetraction) {
@@ -63,4 +63,4 @@ TEST(PathReturn, NoWayTakesNoTime) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::path_return_test

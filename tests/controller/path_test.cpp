@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace vcnc {
+namespace vcnc::path_test {
 namespace {
 
 constexpr double kAngleTolerance = 0.01 * kDegree;
@@ -212,4 +212,4 @@ TEST(Path, RotaryToleranceHoldsForPureTurns) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::path_test

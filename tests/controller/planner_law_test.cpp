@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace vcnc {
+namespace vcnc::planner_law_test {
 namespace {
 
 MotionLimits limits() {
@@ -89,4 +89,4 @@ TEST(SpeedLaw, SlowingDownStretchesTime) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::planner_law_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace vcnc {
+namespace vcnc::planner_limits_test {
 namespace {
 
 Coordinates at(double x, double y, double z = 0, double a = 0, double c = 0) {
@@ -93,4 +93,4 @@ TEST(PlannerLimits, FeedInAllItsMeanings) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::planner_limits_test

@@ -15,7 +15,7 @@
 #include "tests/controller/random_program.hpp"
 #include "tests/sanitized.hpp"
 
-namespace vcnc {
+namespace vcnc::planner_property_test {
 namespace {
 
 using Dynamics = NcParams::Dynamics;
@@ -186,4 +186,4 @@ TEST(ShortRuns, ALineInPiecesTakesAsLongAsInOne) {
 INSTANTIATE_TEST_SUITE_P(Planner, RandomRuns, testing::Values("trunnion", "head"));
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::planner_property_test

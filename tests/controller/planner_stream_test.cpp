@@ -10,7 +10,7 @@
 #include "planned_moves.hpp"
 #include "tests/sanitized.hpp"
 
-namespace vcnc {
+namespace vcnc::planner_stream_test {
 namespace {
 
 using Dynamics = NcParams::Dynamics;
@@ -143,4 +143,4 @@ TEST(Stream, MovesWithoutAPathEndTheRun) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::planner_stream_test

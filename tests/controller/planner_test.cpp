@@ -8,7 +8,7 @@
 #include "bus/tick.hpp"
 #include "planned_moves.hpp"
 
-namespace vcnc {
+namespace vcnc::planner_test {
 namespace {
 
 constexpr double kAngleTolerance = 0.01 * kDegree;
@@ -225,4 +225,4 @@ TEST(Planner, ALapOfThreeThousandPointsIsPlannedInASecond) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::planner_test

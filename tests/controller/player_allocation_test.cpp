@@ -29,7 +29,7 @@ std::size_t allocations = 0;
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
-namespace vcnc {
+namespace vcnc::player_allocation_test {
 namespace {
 
 TEST(PlayerAllocation, NoneWithinARun) {
@@ -58,4 +58,4 @@ TEST(PlayerAllocation, NoneWithinARun) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::player_allocation_test

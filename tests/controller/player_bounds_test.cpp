@@ -4,7 +4,7 @@
 #include "controller/player.hpp"
 #include "program_file.hpp"
 
-namespace vcnc {
+namespace vcnc::player_bounds_test {
 namespace {
 
 TEST(PlayerBounds, AMoveThatAnAxisNeedsMoreThanTenHoursForIsRefused) {
@@ -19,4 +19,4 @@ TEST(PlayerBounds, AMoveThatAnAxisNeedsMoreThanTenHoursForIsRefused) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::player_bounds_test

@@ -15,7 +15,7 @@
 #include "tests/controller/random_program.hpp"
 #include "tests/sanitized.hpp"
 
-namespace vcnc {
+namespace vcnc::player_test {
 namespace {
 
 Machine machine_of(const std::string& name) {
@@ -475,4 +475,4 @@ TEST(Player, TheSurfaceSpeedIsKeptWhileXMoves) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::player_test

@@ -13,7 +13,7 @@
 #include "random_program.hpp"
 #include "tests/sanitized.hpp"
 
-namespace vcnc {
+namespace vcnc::probing_feed_test {
 namespace {
 
 /// The feed that a refusal allows; 0: none.
@@ -132,4 +132,4 @@ TEST(ProbingFeed, RandomProgramsKeepTheBound) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::probing_feed_test

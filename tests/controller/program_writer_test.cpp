@@ -11,7 +11,7 @@
 #include "model/geometry/kinematics.hpp"
 #include "tests/controller/program_file.hpp"
 
-namespace vcnc {
+namespace vcnc::program_writer_test {
 namespace {
 
 std::string config(const std::string& name) {
@@ -344,4 +344,4 @@ TEST(ProgramWriter, WrongOptionsAreNamed) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::program_writer_test

@@ -6,7 +6,7 @@
 
 #include "model/geometry/kinematics.hpp"
 
-namespace vcnc {
+namespace vcnc::retract_test {
 namespace {
 
 TEST(Retract, TakesTheToolAlongItsDeflectionAndALittleFurther) {
@@ -48,4 +48,4 @@ TEST(Retract, TurnsWithAHeadAndStaysWithinTheTravel) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::retract_test

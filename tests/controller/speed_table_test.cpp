@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace vcnc {
+namespace vcnc::speed_table_test {
 namespace {
 
 /// s = T (u - sin(2 pi u) / 2 pi), at rest and without acceleration at both ends.
@@ -49,4 +49,4 @@ TEST(SpeedTable, EndsAreExact) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::speed_table_test

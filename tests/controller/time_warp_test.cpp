@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace vcnc {
+namespace vcnc::time_warp_test {
 namespace {
 
 /// q = amplitude sin(tau) of X at grid points a step apart, limits 1.
@@ -91,4 +91,4 @@ TEST(TimeWarp, UseIsTheLargestShare) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::time_warp_test

@@ -8,7 +8,7 @@
 #include "configs/config.hpp"
 #include "model/geometry/kinematics.hpp"
 
-namespace vcnc {
+namespace vcnc::touch_trigger_test {
 namespace {
 
 Machine machine_of(const std::string& name) {
@@ -70,4 +70,4 @@ TEST(TouchTrigger, AWayThatCannotBeFollowedBackIsNot) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::touch_trigger_test

@@ -14,7 +14,7 @@
 #include "bus/dds/dds_publisher.hpp"
 #include "bus/dds/dds_subscriber.hpp"
 
-namespace vcnc {
+namespace vcnc::dds_test {
 namespace {
 
 const RunBegin kBegin{"run-7", "part.nc", "name = \"machine\"", "name = \"piece\"", 99};
@@ -298,4 +298,4 @@ TEST(DdsProcesses, DifferentTagsNeverMeet) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::dds_test

@@ -9,7 +9,7 @@
 #include "diagnosis/search/candidate.hpp"
 #include "model/effects/numbers.hpp"
 
-namespace vcnc {
+namespace vcnc::axis_replay_test {
 namespace {
 
 constexpr std::size_t kMove = 400, kStand = 2500;  // cycles
@@ -99,4 +99,4 @@ TEST(AxisReplay, ALawOverTimeOrAnotherAxisActsWhileItStands) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::axis_replay_test

@@ -7,7 +7,7 @@
 #include "diagnosis/search/candidate.hpp"
 #include "model/parameters.hpp"
 
-namespace vcnc {
+namespace vcnc::candidates_test {
 namespace {
 
 Machine machine() {
@@ -118,4 +118,4 @@ TEST(AsHypothesis, TurnsChangedNumbersIntoDeviations) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::candidates_test

@@ -12,7 +12,7 @@
 #include "model/math.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::chatter_search_test {
 namespace {
 
 constexpr double kHertz = 31.7;  // no whole number of periods in a lap of a second
@@ -243,4 +243,4 @@ TEST(ChatterSearch, AQuietMachineIsNotSimulated) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::chatter_search_test

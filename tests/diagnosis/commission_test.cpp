@@ -8,7 +8,7 @@
 #include "healthy_run.hpp"
 #include "tests/sanitized.hpp"
 
-namespace vcnc {
+namespace vcnc::commission_test {
 namespace {
 
 Commissioning commissioned_x(const Effects& effects) {
@@ -77,4 +77,4 @@ TEST(Commission, RecoversTheProbeAndTheGeometryOfTheVirtualMachine) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::commission_test

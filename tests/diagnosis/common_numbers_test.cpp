@@ -9,7 +9,7 @@
 #include "diagnosis/search/differential.hpp"
 #include "tests/diagnosis/toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::common_numbers_test {
 namespace {
 
 /// d (1 + s) with the damping d of the probe and a squareness of s rad; the load of X, which has
@@ -194,4 +194,4 @@ TEST(CommonNumbers, KeepAFaultFromBeingToldTwice) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::common_numbers_test

@@ -7,7 +7,7 @@
 
 #include "model/probe/noise.hpp"
 
-namespace vcnc {
+namespace vcnc::comparable_test {
 namespace {
 
 constexpr std::size_t kSamples = 2000;
@@ -138,4 +138,4 @@ TEST(Comparable, NotReadingsThatJumpWhileTheBallSlidesSlowly) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::comparable_test

@@ -7,7 +7,7 @@
 #include "diagnosis/search/selection.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::detection_limits_test {
 namespace {
 
 TEST(DetectionLimit, IsWhereTheHeldOutHalfGainsEnough) {
@@ -104,4 +104,4 @@ TEST(DetectionLimit, OfAnEffectThatSmallSizesDoNotHaveIsWhereItBegins) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::detection_limits_test

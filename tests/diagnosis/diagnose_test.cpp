@@ -15,7 +15,7 @@
 #include "diagnosis/search/suspects.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::diagnose_test {
 namespace {
 
 Diagnosis diagnosed(const Record& record, const Machine& declared = {}) {
@@ -738,4 +738,4 @@ TEST(Commission, FindsFrictionOfAHealthyMachine) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::diagnose_test

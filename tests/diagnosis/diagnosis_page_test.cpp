@@ -10,7 +10,7 @@
 #include "diagnosis/report/diagnosis_text.hpp"
 #include "diagnosis/search/freed_number.hpp"
 
-namespace vcnc {
+namespace vcnc::diagnosis_page_test {
 namespace {
 
 FoundEffect backlash() {
@@ -160,4 +160,4 @@ TEST(DiagnosisPage, TellsTheStoryInPicturesAndIsSelfContained) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::diagnosis_page_test

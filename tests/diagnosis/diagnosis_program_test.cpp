@@ -11,7 +11,7 @@
 #include "controller/player.hpp"
 #include "diagnosis/records/stretches.hpp"
 
-namespace vcnc {
+namespace vcnc::diagnosis_program_test {
 namespace {
 
 Machine machine() {
@@ -112,4 +112,4 @@ TEST(DiagnosisProgram, RefusesWhatItCannotUse) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::diagnosis_program_test

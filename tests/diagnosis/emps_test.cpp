@@ -15,7 +15,7 @@
 #include "diagnosis/search/chatter_search.hpp"
 #include "model/drive/sampled_controller.hpp"
 
-namespace vcnc {
+namespace vcnc::emps_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -157,4 +157,4 @@ TEST_F(Emps, NothingThatWasFoundIsIdle) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::emps_test

@@ -15,7 +15,7 @@
 #include "diagnosis/search/trial_values.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::engine_parts_test {
 namespace {
 
 TEST(NoiseAudit, RecoversAnAutoregressiveProcess) {
@@ -120,7 +120,7 @@ TEST(Partition, HoldsOutEveryOtherLapOfEveryCondition) {
   EXPECT_TRUE(p.repeated);
   EXPECT_EQ(p.conditions(), 3U);
   // The second lap of the first condition, the first of the second one, ...
-  for (const Block& b : p.blocks)
+  for (const RecordBlock& b : p.blocks)
     EXPECT_EQ(b.held_out, (p.stretches[b.stretch].repetition + b.condition) % 2 == 1);
 }
 
@@ -132,7 +132,7 @@ TEST(Partition, OfOneLongMotionFitsAndHoldsOutInTurns) {
   EXPECT_TRUE(p.repetitions().empty());
   EXPECT_EQ(p.conditions(), 6U);
   std::size_t held_out = 0;
-  for (const Block& b : p.blocks) held_out += b.held_out ? b.end - b.begin : 0;
+  for (const RecordBlock& b : p.blocks) held_out += b.held_out ? b.end - b.begin : 0;
   EXPECT_EQ(held_out, 12000U);
 }
 
@@ -327,7 +327,7 @@ TEST(NoiseAudit, TakesWhatWasRunOnceForNoiseWhereItIsLouderThanTheLaps) {
     return std::abs(1 - std::accumulate(f.a.begin(), f.a.end(), 0.0)) / f.scale;
   };
   EXPECT_LT(std::pow(of_constant(of_drift.once) / of_constant(of_drift.filter), 2), 0.03);
-  for (const Block& block : partition(record).blocks)
+  for (const RecordBlock& block : partition(record).blocks)
     EXPECT_EQ(block.once, block.begin >= once.begin && block.end <= once.end);
 }
 
@@ -841,4 +841,4 @@ TEST(FreedNumber, OfWhatDeviatesIsTheTrueValue) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::engine_parts_test

@@ -5,7 +5,7 @@
 #include <atomic>
 #include <stdexcept>
 
-namespace vcnc {
+namespace vcnc::gathering_test {
 namespace {
 
 /// Predicts the load of X, and notes how many machines it was asked for at a time.
@@ -75,4 +75,4 @@ TEST(Gathering, WhatCannotBeAnsweredIsThrownToWhoAsked) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::gathering_test

@@ -22,6 +22,8 @@ RunOfMachine lap_of_the_s_piece(const Effects& effects) {
   return {std::move(run.record), std::move(run.declared), std::move(run.piece)};
 }
 
+namespace healthy_run_test {
+
 TEST(ReversalsInTheAir, AreARecordOfXThatMoves) {
   const RunOfMachine run = reversals_in_the_air({});
   const std::vector<double>& x = run.record.find(SignalKind::command, kX)->value;
@@ -43,4 +45,5 @@ TEST(LapOfTheSPiece, IsARecordOfABallThatIsDeflectedAndOfRotaryAxesThatMove) {
   EXPECT_GT(*std::max_element(c.begin(), c.end()) - *std::min_element(c.begin(), c.end()), 1);
 }
 
+}  // namespace healthy_run_test
 }  // namespace vcnc

@@ -16,7 +16,7 @@
 #include "diagnosis/records/record_check.hpp"
 #include "diagnosis/records/record_file.hpp"
 
-namespace vcnc {
+namespace vcnc::import_table_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -430,4 +430,4 @@ TEST(ImportTable, KnownForcesMayBeConstantAndNeedACommand) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::import_table_test

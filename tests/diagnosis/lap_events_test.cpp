@@ -6,7 +6,7 @@
 
 #include "model/probe/noise.hpp"
 
-namespace vcnc {
+namespace vcnc::lap_events_test {
 namespace {
 
 constexpr std::size_t kLap = 5000, kLaps = 4;  // two conditions, twice each
@@ -98,4 +98,4 @@ TEST(LapEvents, WhatIsMissingIsNone) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::lap_events_test

@@ -9,7 +9,7 @@
 #include "model/probe/noise.hpp"
 #include "tests/diagnosis/toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::lap_shifts_test {
 namespace {
 
 /// Two readings of a ring of which the ball goes round once a lap: n n^T s.
@@ -184,4 +184,4 @@ TEST(Evidence, RoundingIsReckonedWithAsInWhatWasFound) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::lap_shifts_test

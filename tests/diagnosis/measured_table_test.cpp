@@ -6,7 +6,7 @@
 
 #include "diagnosis/records/time_base.hpp"
 
-namespace vcnc {
+namespace vcnc::measured_table_test {
 namespace {
 
 std::string refusal(const std::string& text, const TextFormat& format = {}) {
@@ -109,4 +109,4 @@ TEST(TimeBaseOfStamps, RefusesTimeThatFitsNoGrid) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::measured_table_test

@@ -10,7 +10,7 @@
 #include "model/math.hpp"
 #include "tests/sanitized.hpp"
 
-namespace vcnc {
+namespace vcnc::quadrature_test {
 namespace {
 
 double normal(std::mt19937& random) {
@@ -144,4 +144,4 @@ TEST(Quadrature, TheFoundMachineHasTheEffects) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::quadrature_test

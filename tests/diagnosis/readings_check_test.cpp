@@ -10,7 +10,7 @@
 #include "model/math.hpp"
 #include "model/probe/noise.hpp"
 
-namespace vcnc {
+namespace vcnc::readings_check_test {
 namespace {
 
 constexpr std::size_t kSamples = 2000;
@@ -76,4 +76,4 @@ TEST(ReadingsCheck, AFaultOfTheProbeIsNoSwap) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::readings_check_test

@@ -6,7 +6,7 @@
 
 #include "configs/config.hpp"
 
-namespace vcnc {
+namespace vcnc::record_from_recording_test {
 namespace {
 
 RunBegin begin() {
@@ -63,4 +63,4 @@ TEST(RecordFromRecording, EndsBeforeAnAlarmStopsTheMachine) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::record_from_recording_test

@@ -9,7 +9,7 @@
 #include "model/effects/numbers.hpp"
 #include "tests/diagnosis/recorded_run.hpp"
 
-namespace vcnc {
+namespace vcnc::replica_contract_test {
 namespace {
 
 constexpr double nm = 1e-9;
@@ -108,4 +108,4 @@ INSTANTIATE_TEST_SUITE_P(Library, ReplicaContract, testing::ValuesIn(hypotheses(
                          [](const auto& test) { return test.param; });
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::replica_contract_test

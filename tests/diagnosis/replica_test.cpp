@@ -4,10 +4,10 @@
 #include <cstring>
 #include <future>
 
-#include "diagnosis/replica/commanded_motion.hpp"
+#include "diagnosis/records/commanded_motion.hpp"
 #include "tests/diagnosis/recorded_run.hpp"
 
-namespace vcnc {
+namespace vcnc::replica_test {
 namespace {
 
 bool same_bits(const Prediction& a, const Prediction& b) {
@@ -389,4 +389,4 @@ TEST(SplineDerivative, IsExactForAParabolaInsideAndFourthOrderForASine) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::replica_test

@@ -10,7 +10,7 @@
 #include "healthy_run.hpp"
 #include "tests/sanitized.hpp"
 
-namespace vcnc {
+namespace vcnc::run_once_test {
 namespace {
 
 struct RunOnce {
@@ -82,4 +82,4 @@ TEST(CoarselyRecordedRun, IsNoDeviation) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::run_once_test

@@ -5,7 +5,7 @@
 #include "diagnosis/search/common_numbers.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::selection_test {
 namespace {
 
 std::string names(const SelectionResult& result, const std::vector<Candidate>& candidates) {
@@ -520,4 +520,4 @@ TEST(FitDeclared, LeavesNoMoreThanTheDeclarationWhateverIsWrong) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::selection_test

@@ -7,7 +7,7 @@
 #include "diagnosis/search/selection.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::simplest_form_test {
 namespace {
 
 const std::string kOfX = "effects.X.straightness.";
@@ -86,4 +86,4 @@ TEST(SimplestForm, AWaveKeepsPeriodAndPhaseAndIsPositive) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::simplest_form_test

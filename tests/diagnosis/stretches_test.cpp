@@ -8,7 +8,7 @@
 #include "model/axes.hpp"
 #include "model/math.hpp"
 
-namespace vcnc {
+namespace vcnc::stretches_test {
 namespace {
 
 /// Commands of X and Y at 1 ms.
@@ -161,4 +161,4 @@ TEST(Stretches, AStandingAxisIsMarked) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::stretches_test

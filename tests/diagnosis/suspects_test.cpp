@@ -7,7 +7,7 @@
 #include "model/input_error.hpp"
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::suspects_test {
 namespace {
 
 using Words = std::vector<std::string>;
@@ -81,4 +81,4 @@ TEST(Suspects, NothingElseIsFound) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::suspects_test

@@ -6,7 +6,7 @@
 
 #include "toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::unrest_test {
 namespace {
 
 constexpr std::size_t kMoves = 8000, kStands = 1000, kLaps = 6;
@@ -151,4 +151,4 @@ TEST(Unrest, IsNotAMomentThatOtherLapsDoNotShare) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::unrest_test

@@ -6,7 +6,7 @@
 
 #include "tests/effects/probe_bench.hpp"
 
-namespace vcnc {
+namespace vcnc::acquisition_effects_test {
 namespace {
 
 constexpr double kNm = 1e-9, kPeriod = 20e-6;
@@ -267,4 +267,4 @@ TEST(MainsHum, IsToldFromVibrationByAShiftOfTheDeflection) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::acquisition_effects_test

@@ -6,7 +6,7 @@
 
 #include "model/drive/axis_drive.hpp"
 
-namespace vcnc {
+namespace vcnc::bus_effects_test {
 namespace {
 
 constexpr double kCycle = 1e-3;
@@ -125,4 +125,4 @@ TEST(BusLoss, AnotherSeedLosesOthers) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::bus_effects_test

@@ -3,7 +3,7 @@
 
 #include "tests/effects/contract.hpp"
 
-namespace vcnc {
+namespace vcnc::contract_derivative_test {
 namespace {
 
 TEST(EffectContract, DerivativesAreThoseOfTheStep) {
@@ -14,4 +14,4 @@ TEST(EffectContract, DerivativesAreThoseOfTheStep) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::contract_derivative_test

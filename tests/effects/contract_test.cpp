@@ -13,7 +13,7 @@
 #include "model/parameters.hpp"
 #include "tests/effects/all_nominal.hpp"
 
-namespace vcnc {
+namespace vcnc::contract_test {
 namespace {
 
 /// Calls f(std::type_identity<Effect>()) for every effect; failures name it.
@@ -274,4 +274,4 @@ TEST(EffectInjection, AnEffectOnTheCommandLineIsItsKeyInTheFile) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::contract_test

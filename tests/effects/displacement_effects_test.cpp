@@ -9,7 +9,7 @@
 
 #include "tests/effects/axis_bench.hpp"
 
-namespace vcnc {
+namespace vcnc::displacement_effects_test {
 namespace {
 
 using namespace axis_bench;
@@ -142,4 +142,4 @@ TEST(DisplacementEffects, AmbientCycleReturns) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::displacement_effects_test

@@ -7,7 +7,7 @@
 
 #include "model/effects/ports.hpp"
 
-namespace vcnc {
+namespace vcnc::dual_test {
 namespace {
 
 /// Every function at some points against a central difference of its double version.
@@ -73,4 +73,4 @@ TEST(DualNumbers, LiveInVectors) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::dual_test

@@ -31,7 +31,7 @@ std::size_t allocations = 0;
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
-namespace vcnc {
+namespace vcnc::effects_allocation_test {
 namespace {
 
 /// Allocations of 1000 steps; `active` is set when there was something to step.
@@ -96,4 +96,4 @@ TEST(EffectsAllocation, NoneInADriveWithAllOfThem) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::effects_allocation_test

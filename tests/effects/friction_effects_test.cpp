@@ -6,7 +6,7 @@
 #include "model/effects/chain.hpp"
 #include "tests/effects/axis_bench.hpp"
 
-namespace vcnc {
+namespace vcnc::friction_effects_test {
 namespace {
 
 using namespace axis_bench;
@@ -238,4 +238,4 @@ TEST(FrictionEffects, NeverNegative) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::friction_effects_test

@@ -8,7 +8,7 @@
 #include "model/geometry/kinematics.hpp"
 #include "tests/effects/probe_bench.hpp"
 
-namespace vcnc {
+namespace vcnc::geometry_effects_test {
 namespace {
 
 using Type = KinematicsParams::Type;
@@ -431,4 +431,4 @@ TEST(FrameVibration, ShowsAtStandstill) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::geometry_effects_test

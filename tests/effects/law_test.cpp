@@ -13,7 +13,7 @@
 #include "model/drive/axis_drive.hpp"
 #include "probe_sim/probe_node.hpp"
 
-namespace vcnc {
+namespace vcnc::law_test {
 namespace {
 
 constexpr double kCycleTime = 1e-3, kLoop = 100e-6;
@@ -347,14 +347,14 @@ std::string error_of(const std::string& law) {
 TEST(Law, BadOnesAreRefusedWithTheReason) {
   const std::string force = "axis = \"X\"\npoint = \"table_force\"\n";
   EXPECT_EQ(error_of(force + "at_s = [0, 1]\nvalue_N = [1]\n"),
-            "m: effects.law 1: needs as many values as knots, found 1 and 2");
-  EXPECT_EQ(error_of(force), "m: effects.law 1: needs at least one knot and its value");
+            "m:2: effects.law 1: needs as many values as knots, found 1 and 2");
+  EXPECT_EQ(error_of(force), "m:2: effects.law 1: needs at least one knot and its value");
   EXPECT_EQ(error_of(force + "at_s = [1, 1]\nvalue_N = [1, 2]\n"),
-            "m: effects.law 1: the knots must ascend");
+            "m:2: effects.law 1: the knots must ascend");
   EXPECT_EQ(error_of(force + "at_s = [2, 1]\nvalue_N = [1, 2]\n"),
-            "m: effects.law 1: the knots must ascend");
+            "m:2: effects.law 1: the knots must ascend");
   EXPECT_EQ(error_of(constant("A", "reading", "um", 1)),
-            "m: effects.law 1: the probe has readings in X, Y and Z only");
+            "m:2: effects.law 1: the probe has readings in X, Y and Z only");
   EXPECT_NE(error_of(force + "at_mm = [0]\nvalue_N = [1]\n")
                 .find("m:5: effects.law.at_mm: unknown key; did you mean at_s?"),
             std::string::npos);
@@ -538,4 +538,4 @@ TEST(Deviation, BadOnesAreRefusedWithTheKeyAndWhatIsAllowed) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::law_test

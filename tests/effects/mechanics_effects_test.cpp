@@ -7,7 +7,7 @@
 
 #include "tests/effects/axis_bench.hpp"
 
-namespace vcnc {
+namespace vcnc::mechanics_effects_test {
 namespace {
 
 using namespace axis_bench;
@@ -235,4 +235,4 @@ TEST(MechanicsEffects, StructuralModeIsStableAtAnyFrequency) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::mechanics_effects_test

@@ -11,7 +11,7 @@
 #include "controller/nc_unit.hpp"
 #include "tests/controller/program_file.hpp"
 
-namespace vcnc {
+namespace vcnc::nc_effects_test {
 namespace {
 
 constexpr double kUm = 1e-6, kNm = 1e-9;
@@ -243,4 +243,4 @@ TEST(PathFilter, NullChangesNothing) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::nc_effects_test

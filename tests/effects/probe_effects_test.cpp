@@ -6,7 +6,7 @@
 
 #include "tests/effects/probe_bench.hpp"
 
-namespace vcnc {
+namespace vcnc::probe_effects_test {
 namespace {
 
 constexpr double kUm = 1e-6;
@@ -247,4 +247,4 @@ TEST(RangeClip, ReadsTheEndOfTheRange) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::probe_effects_test

@@ -10,7 +10,7 @@
 #include "model/effects/numbers.hpp"
 #include "model/effects/port_list.hpp"
 
-namespace vcnc {
+namespace vcnc::reference_test {
 namespace {
 
 const std::string kTrunnion = std::string(VCNC_SOURCE_DIR) + "/configs/machines/trunnion.toml";
@@ -205,4 +205,4 @@ TEST(EffectReference, ExamplesOfThePageAreValidMachineFiles) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::reference_test

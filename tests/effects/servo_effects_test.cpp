@@ -8,7 +8,7 @@
 
 #include "model/drive/axis_drive.hpp"
 
-namespace vcnc {
+namespace vcnc::servo_effects_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -431,4 +431,4 @@ TEST(TorqueConstantError, TheReportedForceIsTheTrueOneDivided) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::servo_effects_test

@@ -5,7 +5,7 @@
 
 #include "tests/effects/probe_bench.hpp"
 
-namespace vcnc {
+namespace vcnc::setup_effects_test {
 namespace {
 
 constexpr double kUm = 1e-6;
@@ -91,4 +91,4 @@ TEST(PieceTilt, TurnsWithC) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::setup_effects_test

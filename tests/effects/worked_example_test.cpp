@@ -10,7 +10,7 @@
 #include "model/drive/friction.hpp"
 #include "tests/effects/contract.hpp"
 
-namespace vcnc {
+namespace vcnc::worked_example_test {
 namespace {
 
 std::string file(const std::string& path) {
@@ -159,4 +159,4 @@ TEST(EffectContract, ItsChecksCanFail) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::worked_example_test

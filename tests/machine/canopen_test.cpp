@@ -12,7 +12,7 @@
 #include "servo_sim/spindle_node.hpp"
 #include "tests/machine/harness.hpp"
 
-namespace vcnc {
+namespace vcnc::canopen_test {
 namespace {
 
 constexpr const char* kProgram =
@@ -294,4 +294,4 @@ TEST(CanopenMachine, DataSheetListsEveryObjectOnce) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::canopen_test

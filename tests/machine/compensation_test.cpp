@@ -14,7 +14,7 @@
 #include "model/effects/numbers.hpp"
 #include "tests/machine/harness.hpp"
 
-namespace vcnc {
+namespace vcnc::compensation_test {
 namespace {
 
 constexpr double kUm = 1e-6, kRadius = 25e-3;  // of the circles
@@ -381,4 +381,4 @@ TEST(CompensationFor, ThePulseCarriesTheImpulseThatTheIntegratorNeeds) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::compensation_test

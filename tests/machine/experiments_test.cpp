@@ -12,7 +12,7 @@
 #include "configs/config.hpp"
 #include "tests/sanitized.hpp"
 
-namespace vcnc {
+namespace vcnc::experiments_test {
 namespace {
 
 constexpr double kMicrometre = 1e-6;
@@ -240,4 +240,4 @@ TEST(Gallery, PageHoldsTheEntryWithoutAPicture) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::experiments_test

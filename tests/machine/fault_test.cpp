@@ -10,7 +10,7 @@
 #include "servo_sim/spindle_node.hpp"
 #include "tests/machine/harness.hpp"
 
-namespace vcnc {
+namespace vcnc::fault_test {
 namespace {
 
 PieceParams plane_piece() {
@@ -390,4 +390,4 @@ TEST(Faults, ALostModuleMeansAQuickStopOfTheOthersAndAFailedRun) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::fault_test

@@ -13,7 +13,7 @@
 #include "apps/lockout_suite.hpp"
 #include "tests/machine/harness.hpp"
 
-namespace vcnc {
+namespace vcnc::lockout_test {
 namespace {
 
 using Kind = Scenario::Kind;
@@ -484,4 +484,4 @@ TEST(Lockout, ReportsNameEveryRunAndHowToRepeatIt) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::lockout_test

@@ -10,7 +10,7 @@
 #include "model/input_error.hpp"
 #include "servo_sim/spindle_node.hpp"
 
-namespace vcnc {
+namespace vcnc::memory_folder_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -106,4 +106,4 @@ TEST_F(MemoryFolderTest, DamageToBothNamesTheFilesAndTheWayOut) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::memory_folder_test

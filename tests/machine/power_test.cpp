@@ -12,7 +12,7 @@
 #include "tests/machine/harness.hpp"
 #include "tests/machine/memory_slots.hpp"
 
-namespace vcnc {
+namespace vcnc::power_test {
 namespace {
 
 /// What a machine keeps while it is off.
@@ -478,4 +478,4 @@ TEST(Power, LossesWithOtherFaultsEndSafely) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::power_test

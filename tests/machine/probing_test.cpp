@@ -8,7 +8,7 @@
 #include "tests/machine/harness.hpp"
 #include "tests/machine/memory_slots.hpp"
 
-namespace vcnc {
+namespace vcnc::probing_test {
 namespace {
 
 constexpr double kBall = 3e-3;       ///< radius of the ball of the machine files
@@ -347,4 +347,4 @@ TEST(Probing, TheExampleFindsTheBore) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::probing_test

@@ -10,7 +10,7 @@
 
 #include "apps/demonstrations.hpp"
 
-namespace vcnc {
+namespace vcnc::signature_test {
 namespace {
 
 constexpr double kUm = 1e-6, kRadius = 25e-3;  // of the circles
@@ -642,4 +642,4 @@ INSTANTIATE_TEST_SUITE_P(Library, EverySignature, testing::ValuesIn(all_effect_t
                          [](const auto& one) { return std::string(one.param->name); });
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::signature_test

@@ -7,7 +7,7 @@
 #include "controller/program_writer.hpp"
 #include "tests/machine/harness.hpp"
 
-namespace vcnc {
+namespace vcnc::whole_machine_test {
 namespace {
 
 constexpr double um = 1e-6;
@@ -302,4 +302,4 @@ TEST(Overtravel, TheNcUnitsOwnCheckStopsItWhenTheModuleIsBlind) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::whole_machine_test

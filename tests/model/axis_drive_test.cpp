@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace vcnc {
+namespace vcnc::axis_drive_test {
 namespace {
 
 constexpr double kCycle = 1e-3, kUm = 1e-6;
@@ -507,4 +507,4 @@ TEST(AxisDrive, TakesBackWhatIsAddedToItsForce) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::axis_drive_test

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace vcnc {
+namespace vcnc::bspline_test {
 namespace {
 
 // Cox-de Boor recursion, straight from the definition.
@@ -125,4 +125,4 @@ TEST(BSpline, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::bspline_test

@@ -9,7 +9,7 @@
 
 #include "tests/model/s_eq1.hpp"
 
-namespace vcnc {
+namespace vcnc::contact_test {
 namespace {
 
 constexpr double kStep = 100e-6;
@@ -272,4 +272,4 @@ TEST(ProbeContact, StartsOnTheSurfaceWhenItsZeroIsInside) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::contact_test

@@ -9,7 +9,7 @@
 #include "model/effects/chain.hpp"
 #include "model/math.hpp"
 
-namespace vcnc {
+namespace vcnc::friction_test {
 namespace {
 
 constexpr double kDt = 50e-6, kMass = 500;
@@ -228,4 +228,4 @@ TEST(Friction, NullIsIdentity) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::friction_test

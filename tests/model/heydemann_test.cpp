@@ -9,7 +9,7 @@
 #include "model/math.hpp"
 #include "model/probe/noise.hpp"
 
-namespace vcnc {
+namespace vcnc::heydemann_test {
 namespace {
 
 double phase_error(const SinCos& s, double phi) {
@@ -146,4 +146,4 @@ TEST(OnlineCorrector, StartsAnewAfterABadCollection) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::heydemann_test

@@ -4,7 +4,7 @@
 
 #include <random>
 
-namespace vcnc {
+namespace vcnc::kinematics_test {
 namespace {
 
 constexpr double kMm = 1e-3;
@@ -209,4 +209,4 @@ TEST(RotaryFromAxis, KeepsCAtThePole) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::kinematics_test

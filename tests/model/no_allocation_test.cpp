@@ -27,7 +27,7 @@ void* operator new(std::size_t size) {
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
-namespace vcnc {
+namespace vcnc::no_allocation_test {
 namespace {
 
 template <class Step>
@@ -85,4 +85,4 @@ TEST(NoAllocation, ProbeOnThePiece) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::no_allocation_test

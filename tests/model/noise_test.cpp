@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace vcnc {
+namespace vcnc::noise_test {
 namespace {
 
 // Known answers published with the Random123 library.
@@ -74,4 +74,4 @@ TEST(Noise, IsAPureFunction) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::noise_test

@@ -4,7 +4,7 @@
 
 #include <stdexcept>
 
-namespace vcnc {
+namespace vcnc::parameters_test {
 namespace {
 
 TEST(Parameters, EachIsFoundByItsKey) {
@@ -48,4 +48,4 @@ TEST(Parameters, AreSetByKeyWithinTheirRange) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::parameters_test

@@ -6,7 +6,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace vcnc {
+namespace vcnc::piece_test {
 namespace {
 
 using Kind = PieceParams::Kind;
@@ -160,4 +160,4 @@ TEST(ScanHeight, GivesTheScanPathThroughABallCentre) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::piece_test

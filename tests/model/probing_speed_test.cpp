@@ -8,7 +8,7 @@
 #include "model/probe/contact.hpp"
 #include "model/safety/protection.hpp"
 
-namespace vcnc {
+namespace vcnc::probing_speed_test {
 namespace {
 
 using By = ProbingBound::By;
@@ -148,4 +148,4 @@ TEST(ProbingLimit, HoldsForTheWholeKinematics) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::probing_speed_test

@@ -4,7 +4,7 @@
 
 #include <random>
 
-namespace vcnc {
+namespace vcnc::protection_test {
 namespace {
 
 using State = ProtectionState;
@@ -108,4 +108,4 @@ TEST(Protection, NeverRelaxesByItself) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::protection_test

@@ -10,7 +10,7 @@
 #include "model/geometry/kinematics.hpp"
 #include "tests/model/s_eq1.hpp"
 
-namespace vcnc {
+namespace vcnc::ruled_piece_test {
 namespace {
 
 double uniform(std::mt19937_64& engine, double low, double high) {
@@ -311,4 +311,4 @@ TEST(MakePiece, NamesTheKeyOfABadRim) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::ruled_piece_test

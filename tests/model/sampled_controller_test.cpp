@@ -9,7 +9,7 @@
 
 #include "model/drive/axis_drive.hpp"
 
-namespace vcnc {
+namespace vcnc::sampled_controller_test {
 namespace {
 
 constexpr double kT = 1e-3;
@@ -190,4 +190,4 @@ TEST(SampledController, ExplicitVelocityGainOfACascade) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::sampled_controller_test

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace vcnc {
+namespace vcnc::signals_test {
 namespace {
 
 constexpr double kPeriod = 20e-6, kStep = 100e-6, kNm = 1e-9;
@@ -225,4 +225,4 @@ TEST(Unwrapper, FollowsALongWay) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::signals_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace vcnc {
+namespace vcnc::spindle_test {
 namespace {
 
 constexpr double kCycle = 1e-3;
@@ -89,4 +89,4 @@ TEST(Spindle, OrientsFromAnySpeedWithoutTurningBack) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::spindle_test

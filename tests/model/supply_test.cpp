@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace vcnc {
+namespace vcnc::supply_test {
 namespace {
 
 constexpr double kStep = 1e-3;
@@ -95,4 +95,4 @@ TEST(Supply, WithoutAStoreTheLossIsDarkAtOnce) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::supply_test

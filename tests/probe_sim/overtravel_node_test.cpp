@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace vcnc {
+namespace vcnc::overtravel_node_test {
 namespace {
 
 using State = OvertravelState::State;
@@ -179,4 +179,4 @@ TEST(OvertravelLatch, RefusesWhatItCannotUnderstand) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::overtravel_node_test

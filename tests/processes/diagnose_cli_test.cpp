@@ -7,7 +7,7 @@
 
 #include "tests/processes/shell.hpp"
 
-namespace vcnc {
+namespace vcnc::diagnose_cli_test {
 namespace {
 
 constexpr double kPi2 = 2 * std::numbers::pi;
@@ -189,4 +189,4 @@ TEST_F(DiagnoseCli, TheMapHasItsReference) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::diagnose_cli_test

@@ -6,7 +6,7 @@
 
 #include "tests/processes/shell.hpp"
 
-namespace vcnc {
+namespace vcnc::fault_test {
 namespace {
 
 const std::string kMachine = configs("machines/trunnion_measured.toml");
@@ -220,4 +220,4 @@ TEST_F(FaultyProcesses, ABadFaultIsOneClearError) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::fault_test

@@ -6,7 +6,7 @@
 
 #include "tests/processes/shell.hpp"
 
-namespace vcnc {
+namespace vcnc::lockout_cli_test {
 namespace {
 
 /// What is wrong with a text as XML; empty: nothing. Enough for elements, attributes and entities.
@@ -160,4 +160,4 @@ TEST_F(LockoutCli, TheListShowsKindsAndKeys) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::lockout_cli_test

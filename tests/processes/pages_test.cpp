@@ -3,7 +3,7 @@
 
 #include "tests/processes/shell.hpp"
 
-namespace vcnc {
+namespace vcnc::pages_test {
 namespace {
 
 class Pages : public testing::Test {
@@ -112,4 +112,4 @@ TEST_F(Pages, CompareRefusesWhatIsNoRun) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::pages_test

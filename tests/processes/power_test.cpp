@@ -3,7 +3,7 @@
 
 #include "tests/processes/shell.hpp"
 
-namespace vcnc {
+namespace vcnc::power_test {
 namespace {
 
 const std::string kMachine = configs("machines/trunnion.toml");
@@ -108,4 +108,4 @@ TEST_F(PowerProcesses, BadMemoriesAreOneClearError) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::power_test

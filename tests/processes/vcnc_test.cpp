@@ -11,7 +11,7 @@
 #include "bus/hub.hpp"
 #include "tests/processes/shell.hpp"
 
-namespace vcnc {
+namespace vcnc::vcnc_test {
 namespace {
 
 const std::string kMachine = configs("machines/trunnion_measured.toml");
@@ -417,4 +417,4 @@ TEST_F(Vcnc, ProgramsOfEveryKindRunOnBothKinematics) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::vcnc_test

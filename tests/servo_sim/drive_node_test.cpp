@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-namespace vcnc {
+namespace vcnc::drive_node_test {
 namespace {
 
 /// One drive X alone on a bus that the test plays by hand.
@@ -203,4 +203,4 @@ TEST_F(DriveNodeTest, TheLimitSwitchStopsAndLetsBack) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::drive_node_test

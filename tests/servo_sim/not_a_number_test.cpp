@@ -9,7 +9,7 @@
 #include "servo_sim/drive_node.hpp"
 #include "servo_sim/spindle_node.hpp"
 
-namespace vcnc {
+namespace vcnc::not_a_number_test {
 namespace {
 
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
@@ -91,4 +91,4 @@ TEST(SpindleDrive, FastAndSlowToBrakeOrientsWithoutCountingTurns) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::not_a_number_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace vcnc {
+namespace vcnc::spindle_node_test {
 namespace {
 
 class SpindleNodeTest : public testing::Test {
@@ -141,4 +141,4 @@ TEST(SpindleLock, RefusesWhatItCannotUnderstand) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::spindle_node_test

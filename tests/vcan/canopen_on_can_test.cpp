@@ -6,7 +6,7 @@
 
 #include "tests/processes/shell.hpp"
 
-namespace vcnc {
+namespace vcnc::canopen_on_can_test {
 namespace {
 
 /// Runs for as long as the object lives.
@@ -122,4 +122,4 @@ TEST(CanopenOnCan, CansendTalksToAMachineThatRuns) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::canopen_on_can_test

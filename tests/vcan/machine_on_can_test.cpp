@@ -4,7 +4,7 @@
 
 #include "tests/processes/shell.hpp"
 
-namespace vcnc {
+namespace vcnc::machine_on_can_test {
 namespace {
 
 TEST(MachineOnCan, SameHashAsInOneProcess) {
@@ -29,4 +29,4 @@ TEST(MachineOnCan, SameHashAsInOneProcess) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::machine_on_can_test

@@ -17,7 +17,7 @@
 #include "bus/run_node.hpp"
 #include "tests/bus/toy_machine.hpp"
 
-namespace vcnc {
+namespace vcnc::socketcan_test {
 namespace {
 
 std::string interface() {
@@ -200,4 +200,4 @@ TEST(Socketcan, KilledNodeTimesOutByName) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::socketcan_test

@@ -6,7 +6,7 @@
 #include <functional>
 #include <random>
 
-namespace vcnc {
+namespace vcnc::expression_test {
 namespace {
 
 class NoSystem : public SystemParameters {
@@ -180,4 +180,4 @@ TEST_F(Expression, RandomTreesAgreeWithTheirOwnValue) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::expression_test

@@ -12,7 +12,7 @@
 #include "controller/program_error.hpp"
 #include "tests/controller/program_file.hpp"
 
-namespace vcnc {
+namespace vcnc::features_test {
 namespace {
 
 InterpreterOptions bare() {
@@ -741,4 +741,4 @@ TEST(Gouge, NeedsAWallOnTheToolsSide) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::features_test

@@ -8,7 +8,7 @@
 #include "controller/player.hpp"
 #include "tests/controller/program_file.hpp"
 
-namespace vcnc {
+namespace vcnc::interpreter_test {
 namespace {
 
 Machine test_machine() {
@@ -410,4 +410,4 @@ TEST(RefusedPrograms, AnEmptyFileIsNamedWithoutALine) {
 TEST(RefusedPrograms, AreMany) { EXPECT_GE(std::size(kWrong), 60u); }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::interpreter_test

@@ -11,7 +11,7 @@
 #include "controller/program_error.hpp"
 #include "tests/controller/program_file.hpp"
 
-namespace vcnc {
+namespace vcnc::nc_data_test {
 namespace {
 
 struct Played {
@@ -134,4 +134,4 @@ TEST(ProgramPath, IsSearchedAfterThePrograms) {
 }
 
 }  // namespace
-}  // namespace vcnc
+}  // namespace vcnc::nc_data_test

@@ -1,4 +1,4 @@
-#include "diagnosis/replica/commanded_motion.hpp"
+#include "diagnosis/records/commanded_motion.hpp"
 
 #include <algorithm>
 #include <cmath>
