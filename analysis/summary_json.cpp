@@ -125,13 +125,13 @@ std::string to_json(const Summary& s) {
                   {"e_plan_um", error_statistics(whole.e_plan)},
                   {"e_servo_um", error_statistics(whole.e_servo)},
                   {"e_rest_um", error_statistics(whole.e_rest)},
-                  {"coverage_json", coverage_json(s)},
+                  {"coverage", coverage_json(s)},
                   {"following_error", axes(s)},
                   {"lag_um", error_statistics(s.lag)},
                   {"cross_um", error_statistics(s.cross)},
                   {"parts", groups(s)},
                   {"crossings", crossings(s)},
-                  {"circles_json", circles_json(s)},
+                  {"circles", circles_json(s)},
                   {"alarms", alarms(s)},
                   {"warnings", s.warnings}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

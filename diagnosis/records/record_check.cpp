@@ -90,31 +90,6 @@ bool fits(const Relation& r) {
   return r.known && r.correlation > kFits && std::abs(r.slope - 1) <= kSlope;
 }
 
-/// A usual mistake that makes a factor of this size.
-std::string mistake(double factor) {
-  struct Known {
-    double factor;
-    const char* text;
-  };
-  constexpr double kTurn = 2 * kPi;
-  static const std::array known{
-      Known{1e3, "1000: m and mm, or s and ms"},
-      Known{1e6, "1e6: m and um, or s and us"},
-      Known{1 / kDegree, "57.3: radians and degrees"},
-      Known{kTurn, "2 pi: turns and radians"},
-      Known{360, "360: turns and degrees"},
-      Known{60, "60: per second and per minute"},
-      Known{6e4, "60000: m/s and mm/min"},
-      Known{25.4, "25.4: inches and mm"},
-      Known{2, "2: diameter and radius, or periods and half periods"},
-  };
-  for (const Known& k : known)
-    for (const double f : {k.factor, 1 / k.factor})
-      if (std::abs(std::abs(factor) / f - 1) < 0.03)
-        return fmt::format(" (a factor of {})", k.text);
-  return "";
-}
-
 class Checker {
  public:
   Checker(Record& record, const std::vector<MeasuredSignal>& velocities, const Machine* declared)
@@ -223,11 +198,12 @@ class Checker {
     const bool belongs = std::abs(r.correlation) >= kBelongs;
     if (belongs && std::abs(r.slope - 1) <= kSlope) return;
     if (fits(relate(speed_of(s), smoothed(own->value, half_))))
-      refuse(fmt::format("{} is the slope_of of {}: the columns are swapped", name(*own),
+      refuse(fmt::format("{} is the derivative of {}: the columns are swapped", name(*own),
                          speed_name(s)));
     if (belongs) {
-      const std::string found = fmt::format("{} is {:.4g} times the slope_of of {}{}",
-                                            speed_name(s), r.slope, name(*own), mistake(r.slope));
+      const std::string found =
+          fmt::format("{} is {:.4g} times the derivative of {}{}", speed_name(s), r.slope,
+                      name(*own), usual_mistake(r.slope));
       if (!(r.slope > 0.75 && r.slope < 1.33))
         refuse(found + "; check unit, scale and sign of the two columns");
       warn(found);
@@ -236,11 +212,11 @@ class Checker {
     for (std::size_t other = 0; other < kAxisCount; ++other) {
       const MeasuredSignal* o = motion(other);
       if (o && other != s.axis && !constant(o->value) && fits(relate(speed_of(*o), measured)))
-        refuse(fmt::format("{} is the slope_of of {}, not of {}: the columns are swapped",
+        refuse(fmt::format("{} is the derivative of {}, not of {}: the columns are swapped",
                            speed_name(s), name(*o), name(*own)));
     }
     refuse(
-        fmt::format("{} is not the slope_of of {} (correlation {:.2f}); one of the columns is "
+        fmt::format("{} is not the derivative of {} (correlation {:.2f}); one of the columns is "
                     "another signal",
                     speed_name(s), name(*own), r.correlation));
   }
@@ -265,7 +241,7 @@ class Checker {
     if (r.correlation >= kBelongs) {
       if (std::abs(r.slope - 1) <= 2 * kSlope) return check_order(s, *own);
       const std::string found = fmt::format("{} moves {:.4g} times as far as {}{}", name(s),
-                                            r.slope, name(*own), mistake(r.slope));
+                                            r.slope, name(*own), usual_mistake(r.slope));
       if (r.slope > 0.5 && r.slope < 1.9)
         warn(found);
       else
@@ -408,7 +384,7 @@ class Checker {
       warn(fmt::format(
           "{} over acceleration is {:.4g} {}, {:.3g} times the declared inertia{}; "
           "check unit and scale of the force",
-          name(s), fit->mass, is_rotary(s.axis) ? "kg m2" : "kg", ratio, mistake(ratio)));
+          name(s), fit->mass, is_rotary(s.axis) ? "kg m2" : "kg", ratio, usual_mistake(ratio)));
   }
 
   Record& record_;
@@ -418,6 +394,30 @@ class Checker {
 };
 
 }  // namespace
+
+std::string usual_mistake(double factor) {
+  struct Known {
+    double factor;
+    const char* text;
+  };
+  constexpr double kTurn = 2 * kPi;
+  static const std::array known{
+      Known{1e3, "1000: m and mm, or s and ms"},
+      Known{1e6, "1e6: m and um, or s and us"},
+      Known{1 / kDegree, "57.3: radians and degrees"},
+      Known{kTurn, "2 pi: turns and radians"},
+      Known{360, "360: turns and degrees"},
+      Known{60, "60: per second and per minute"},
+      Known{6e4, "60000: m/s and mm/min"},
+      Known{25.4, "25.4: inches and mm"},
+      Known{2, "2: diameter and radius, or periods and half periods"},
+  };
+  for (const Known& k : known)
+    for (const double f : {k.factor, 1 / k.factor})
+      if (std::abs(std::abs(factor) / f - 1) < 0.03)
+        return fmt::format(" (a factor of {})", k.text);
+  return "";
+}
 
 double resolution_of(const std::vector<double>& value) {
   constexpr std::size_t kMost = 20'000;

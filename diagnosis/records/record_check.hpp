@@ -16,6 +16,9 @@
 //               missing samples
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "diagnosis/records/record.hpp"
 
 namespace vcnc {
@@ -25,6 +28,9 @@ namespace vcnc {
 /// that only serve to check; `declared` may be null.
 void check_record(Record& record, const std::vector<MeasuredSignal>& velocities,
                   const Machine* declared);
+
+/// The usual mistake that makes a factor of this size, to be added to a message; empty: none does.
+std::string usual_mistake(double factor);
 
 /// The step that all differences are multiples of; 0: none was found.
 double resolution_of(const std::vector<double>& value);

@@ -2,16 +2,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "diagnosis/records/measured_table.hpp"
+#include "diagnosis/records/record_check.hpp"
 #include "diagnosis/records/signal_name.hpp"
 
 namespace vcnc {
 namespace {
 
 constexpr double kIs = 0.95, kMayBe = 0.7;  // correlations
+constexpr double kSame = 1.03;              // of two factors
+constexpr double kDeflected = 10e-6;        // rms from which on a ball is deflected [m]
 
 double correlation(const std::vector<double>& x, const std::vector<double>& y) {
   double n = 0, sx = 0, sy = 0, xx = 0, yy = 0, xy = 0;
@@ -23,18 +28,47 @@ double correlation(const std::vector<double>& x, const std::vector<double>& y) {
   return square > 0 ? (n * xy - sx * sy) / std::sqrt(square) : 0;
 }
 
+struct Reading {
+  const MeasuredSignal* measured;
+  const std::vector<double>& predicted;
+};
+
+/// Of what is measured over what is predicted, by least squares through zero, where the one follows
+/// the other.
+std::optional<double> factor_of(const Reading& r) {
+  double n = 0, xx = 0, yy = 0, xy = 0;
+  for (std::size_t k = 0; k < r.predicted.size(); ++k) {
+    const double x = r.predicted[k], y = r.measured->value[k];
+    if (!std::isfinite(x) || !std::isfinite(y)) continue;
+    ++n, xx += x * x, yy += y * y, xy += x * y;
+  }
+  if (!(xx > n * kDeflected * kDeflected) || xy < kIs * std::sqrt(xx * yy)) return std::nullopt;
+  return xy / xx;
+}
+
 std::string name(const MeasuredSignal& s) {
   return fmt::format("\"{}\" ({})", s.source, signal_name(s.kind, s.axis));
+}
+
+/// Readings in another unit are all too large by the same.
+void check_unit(const Record& record, const std::vector<Reading>& readings) {
+  std::vector<double> factors;
+  for (const Reading& r : readings)
+    if (const std::optional<double> factor = factor_of(r)) factors.push_back(*factor);
+  if (factors.size() < 2) return;
+  const auto [least, most] = std::minmax_element(factors.begin(), factors.end());
+  const std::string mistake = usual_mistake(*most);
+  if (mistake.empty() || *most > kSame * *least) return;
+  throw MeasurementError(fmt::format(
+      "{}: all readings of the probe are {:.3g} times what the machine of the model would "
+      "read{}; check their unit, and the sizes of ball and piece",
+      record.source, *most, mistake));
 }
 
 }  // namespace
 
 void check_readings(const Record& record, const std::vector<ComparedChannel>& channels,
                     const Prediction& predicted) {
-  struct Reading {
-    const MeasuredSignal* measured;
-    const std::vector<double>& predicted;
-  };
   std::vector<Reading> readings;
   for (std::size_t c = 0; c < channels.size(); ++c) {
     const auto& [kind, axis] = channels[c];
@@ -53,6 +87,7 @@ void check_readings(const Record& record, const std::vector<ComparedChannel>& ch
       if (alike(a, b) > kIs && alike(a, a) < kMayBe && alike(b, b) < kMayBe)
         throw MeasurementError(fmt::format("{}: {} is what {} would be: the columns are swapped",
                                            record.source, name(*a.measured), name(*b.measured)));
+  check_unit(record, readings);
 }
 
 }  // namespace vcnc

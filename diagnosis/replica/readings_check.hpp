@@ -2,7 +2,9 @@
 //
 // Of a table nothing tells which column is which but the model: if one reads as another is
 // predicted (correlation above 0.95) and neither as it should itself (below 0.7), or if one
-// is its own prediction turned (below -0.95), no fault of a machine did that.
+// is its own prediction turned (below -0.95), no fault of a machine did that. Nor did one make all
+// readings two, 25.4 or a thousand times as large (within 3 %, least squares through zero, of at
+// least two readings that follow what is predicted).
 #pragma once
 
 #include "diagnosis/records/record.hpp"

@@ -69,6 +69,16 @@ TEST(ReadingsCheck, NamesAReadingThatGoesTheOtherWay) {
             "run.csv: \"u\" (twist X) goes against what the machine does; check its sign");
 }
 
+TEST(ReadingsCheck, NamesTheMistakeThatMakesAllReadingsTooLarge) {
+  EXPECT_EQ(refusal({0, 1, 2}, {2, 2, 2}),
+            "run.csv: all readings of the probe are 2 times what the machine of the model would "
+            "read (a factor of 2: diameter and radius, or periods and half periods); check their "
+            "unit, and the sizes of ball and piece");
+  EXPECT_NE(refusal({0, 1, 2}, {25.4, 25.4, 25.4}).find("inches and mm"), std::string::npos);
+  EXPECT_EQ(refusal({0, 1, 2}, {1.3, 1.3, 1.3}), "");
+  EXPECT_EQ(refusal({0, 1, 2}, {2, 2, 1}), "");
+}
+
 TEST(ReadingsCheck, AFaultOfTheProbeIsNoSwap) {
   EXPECT_EQ(refusal({0, 1, 2}, {0.5, 2, 1}), "");
   EXPECT_EQ(refusal({0, 1, 2}, {1, 0, 1}), "");  // dead
