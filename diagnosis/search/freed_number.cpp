@@ -36,13 +36,7 @@ constexpr Tolerance kResidues[] = {
     {"effects.Z.", ".thermal_drift.offset_um", 3},
 };
 
-/// Of a change between two runs, in the unit of the key.
-constexpr Tolerance kChanges[] = {{"effects.probe.tip_radius.", ".larger_um", 0.3}};
-
-double tolerance_of(const std::string& key, double value, Against against) {
-  if (against == Against::healthy_run)
-    for (const Tolerance& t : kChanges)
-      if (key.starts_with(t.prefix) && key.find(t.part) != std::string::npos) return t.size;
+double tolerance_of(const std::string& key, double value) {
   for (const Tolerance& t : kResidues)
     if (key.starts_with(t.prefix) && key.find(t.part) != std::string::npos) return t.size;
   for (const Tolerance& t : kTolerances)
@@ -164,7 +158,7 @@ std::vector<FreedNumber> nuisances(const Machine& declared, Against against) {
     const double value = d ? d->value : p.in_unit();
     const Uncertainty* told =
         against == Against::declaration ? uncertainty_of(declared, p.key) : nullptr;
-    const double tolerance = told ? told->standard : tolerance_of(p.key, value, against);
+    const double tolerance = told ? told->standard : tolerance_of(p.key, value);
     const bool free = told && told->free();
     if (tolerance <= 0 && !free) continue;
     // Counted in what is small, so that differences are taken near the declaration.

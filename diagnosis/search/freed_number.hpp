@@ -57,8 +57,8 @@ enum class Against { declaration, healthy_run };
 ///   damping of declared windup                 50 %
 ///   where the piece was clamped                free (100 um, 500 urad); reported above 5 um
 ///   scale of a linear axis                     1.5 ppm
-///   size of gauge and ball                     1 um; 0.3 um between two runs: a steel ring of
-///                                              60 mm in diameter grows by that in 1 K
+///   size of gauge and ball                     1 um; between two runs, too: a steel ring of 50 mm
+///                                              in diameter grows by 0.6 um in 1 K
 ///   drift of a linear axis                     3 um with 1200 s: 0.15 um/min
 ///
 /// Against the declaration, those that the machine lists as uncertain are as uncertain as it says:
