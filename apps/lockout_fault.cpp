@@ -19,7 +19,6 @@ using State = OvertravelState::State;
 /// The run ends when the measured axes are slower than 1 um per cycle; the true ones are near.
 constexpr double kRest = 2e-6, kRestRotary = 2e-5;
 constexpr Tick kRunDown = 10;  ///< cycles after the end: silence found out, and a standing brake
-constexpr Tick kDetectionChain = 2;  ///< sample k, judged k+1, acts k+2 (apps/lockout_trip.hpp)
 /// A reading that jumps further than this in a cycle is found out (model/safety/protection.hpp).
 constexpr double kCountable = 5;
 

@@ -4,7 +4,8 @@
 // own supervision share nothing but the bus, and the bus is supervised by everyone. With a fault
 // the machine is safe if
 //   * it stopped, or the true deflection never left the usable range;
-//   * it began to stop at the latest kChain + kFaultDelay cycles after a sample in which the range
+//   * it began to stop at the latest kDetectionChain + kFaultDelay cycles after a sample in which
+//   the range
 //     was left: two cycles without a message are borne, one more finds that out;
 //   * every axis truly stands at the end, with the spindle locked, and the spindle was locked or
 //     stood when the axes came to rest; a machine that only waits for its mains need not lock it;

@@ -26,7 +26,6 @@ using Cause = OvertravelState::Cause;
 constexpr double kSampleTime = kCycle / kLoopStepsPerCycle;
 constexpr double kStandingLinear = 1e-6, kStandingRotary = 1e-5;  ///< per cycle
 constexpr Tick kStandingCycles = 5;
-constexpr Tick kChain = 2;  ///< sample k, judged k+1, acts k+2
 
 Tick size_of(const TripLog& log) { return static_cast<Tick>(log.size()); }
 const TripCycle& at(const TripLog& log, Tick k) { return log[static_cast<std::size_t>(k)]; }
@@ -184,7 +183,7 @@ TripFigures measure(const TripLog& log, const Machine& machine) {
   if (!operated && alarm >= 0) quick = alarm + 1;  // and never will
   f.hard = quick >= 0;
   // A command that asks for the lock is the first that brakes; it acts one cycle later.
-  f.soft = alarm >= 0 && !(f.hard && quick <= alarm + kChain);
+  f.soft = alarm >= 0 && !(f.hard && quick <= alarm + kDetectionChain);
   if (f.hard) f.quick_stop = seconds(quick);
   if (alarm >= 0) f.action = seconds(alarm + 1);
   if (f.hard && !(f.action <= f.quick_stop)) f.action = f.quick_stop;
@@ -319,10 +318,10 @@ class Judge {
               range_.share(sampled(log_, k)) > Protection::kRunawayShare + margin / smallest);
     });
     // The last samples of a run may not have had the time.
-    const auto due = [&](Tick k) { return k >= 0 && k + kChain < size_of(log_); };
-    if (due(out) && !(f_.action <= seconds(out + kChain) + 1e-9))
+    const auto due = [&](Tick k) { return k >= 0 && k + kDetectionChain < size_of(log_); };
+    if (due(out) && !(f_.action <= seconds(out + kDetectionChain) + 1e-9))
       say(fmt::format("out of range in the sample of cycle {}, but {}", out, acted(f_.action)));
-    if (due(hard) && !(f_.quick_stop <= seconds(hard + kChain) + 1e-9))
+    if (due(hard) && !(f_.quick_stop <= seconds(hard + kDetectionChain) + 1e-9))
       say(fmt::format("beyond the hard threshold in the sample of cycle {}, but {}", hard,
                       acted(f_.quick_stop)));
   }

@@ -36,6 +36,8 @@ namespace vcnc {
 class OvertravelNode;
 class VirtualMachine;
 
+inline constexpr Tick kDetectionChain = 2;  ///< sample k, judged k+1, acts k+2
+
 /// One cycle as an observer sees it.
 struct TripCycle {
   AxisVector commanded{}, measured{};

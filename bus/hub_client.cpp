@@ -22,6 +22,17 @@ void set_timeout(int fd, int timeout_ms) {
   ::setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &time, sizeof time);
 }
 
+/// A call on a socket with a time limit ends with EINTR when the process was stopped and goes on,
+/// even without a handler (signal(7)).
+template <class Call>
+ssize_t uninterrupted(Call call) {
+  ssize_t result;
+  do {
+    result = call();
+  } while (result < 0 && errno == EINTR);
+  return result;
+}
+
 /// Sent at once, with what was kept back for it.
 bool is_answered(const Frame& frame) {
   return frame.id == kSyncId || frame.id == kNmtId || is_sdo(frame.id);
@@ -43,8 +54,9 @@ HubTransport::HubTransport(const std::string& path, int node_id)
                                           static_cast<std::uint8_t>(node_id)};
   set_timeout(fd_.get(), kWelcomeTimeoutMs);
   std::uint8_t reply = 0;
-  if (::send(fd_.get(), hello, sizeof hello, MSG_NOSIGNAL) != sizeof hello ||
-      ::recv(fd_.get(), &reply, 1, 0) != 1)
+  const auto say = [&] { return ::send(fd_.get(), hello, sizeof hello, MSG_NOSIGNAL); };
+  const auto hear = [&] { return ::recv(fd_.get(), &reply, 1, 0); };
+  if (uninterrupted(say) != sizeof hello || uninterrupted(hear) != 1)
     throw BusError(fmt::format("hub \"{}\" does not answer", path));
   switch (Welcome{reply}) {
     case Welcome::ok:
@@ -65,10 +77,8 @@ void HubTransport::send(std::span<const Frame> slot) {
                                outgoing_.size(), kLargestSlot));
   if (outgoing_.empty()) return;
   if (master_ && std::none_of(slot.begin(), slot.end(), is_answered)) return;
-  ssize_t sent;
-  do {
-    sent = ::send(fd_.get(), outgoing_.data(), outgoing_.size(), MSG_NOSIGNAL);
-  } while (sent < 0 && errno == EINTR);
+  const ssize_t sent = uninterrupted(
+      [&] { return ::send(fd_.get(), outgoing_.data(), outgoing_.size(), MSG_NOSIGNAL); });
   outgoing_.clear();
   // That the hub is gone is told by receive(), behind what it said before.
   if (sent < 0 && errno != EPIPE && errno != ECONNRESET)

@@ -3,15 +3,9 @@
 #include <algorithm>
 
 #include "bus/messages.hpp"
+#include "bus/sdo.hpp"
 
 namespace vcnc {
-
-namespace {
-
-constexpr std::size_t kExpeditedSize = 4, kSegmentSize = 7;
-constexpr std::uint8_t kToggleBit = 0x10, kLastBit = 0x01;
-
-}  // namespace
 
 Frame SdoClient::request(std::uint8_t command) const {
   return encode_sdo_request({.node = node_, .command = command, .index = index_, .sub = sub_});
@@ -35,8 +29,8 @@ Frame SdoClient::download(std::uint16_t index, std::uint8_t sub, ObjectBytes byt
   sent_ = 0;
   phase_ = Phase::begin_download;
   SdoMessage m{.node = node_, .command = 0x21, .index = index, .sub = sub};
-  if (!bytes_.empty() && bytes_.size() <= kExpeditedSize) {
-    m.command = static_cast<std::uint8_t>(0x23 | (kExpeditedSize - bytes_.size()) << 2);
+  if (!bytes_.empty() && bytes_.size() <= kSdoExpeditedBytes) {
+    m.command = static_cast<std::uint8_t>(0x23 | (kSdoExpeditedBytes - bytes_.size()) << 2);
     std::copy(bytes_.begin(), bytes_.end(), m.data.begin());
     sent_ = bytes_.size();
   } else {
@@ -57,18 +51,18 @@ Frame SdoClient::give_up(SdoAbort why) {
 
 Frame SdoClient::next_upload() {
   Frame frame = encode_sdo_request({.node = node_, .command = 0x60});
-  if (toggle_) frame.data[0] |= kToggleBit;
+  if (toggle_) frame.data[0] |= kSdoToggle;
   return frame;
 }
 
 Frame SdoClient::next_download() {
-  const std::size_t size = std::min(kSegmentSize, bytes_.size() - sent_);
+  const std::size_t size = std::min(kSdoSegmentBytes, bytes_.size() - sent_);
   Frame frame = encode_sdo_request({.node = node_});
-  frame.data[0] = static_cast<std::uint8_t>((kSegmentSize - size) << 1);
-  if (toggle_) frame.data[0] |= kToggleBit;
+  frame.data[0] = static_cast<std::uint8_t>((kSdoSegmentBytes - size) << 1);
+  if (toggle_) frame.data[0] |= kSdoToggle;
   std::copy_n(bytes_.begin() + static_cast<std::ptrdiff_t>(sent_), size, frame.data.begin() + 1);
   sent_ += size;
-  if (sent_ == bytes_.size()) frame.data[0] |= kLastBit;
+  if (sent_ == bytes_.size()) frame.data[0] |= kSdoLast;
   return frame;
 }
 
@@ -85,12 +79,12 @@ std::optional<Frame> SdoClient::feed(const Frame& frame) {
     return std::nullopt;
   }
   const bool other = answer->index != index_ || answer->sub != sub_;
-  const bool toggled = (answer->command & kToggleBit) != 0;
+  const bool toggled = (answer->command & kSdoToggle) != 0;
   switch (phase_) {
     case Phase::begin_upload: {
       if (command != 2 || other) return give_up(SdoAbort::command);
       if (answer->command & 0x02) {
-        const std::size_t size = kExpeditedSize - ((answer->command >> 2) & 0x03);
+        const std::size_t size = kSdoExpeditedBytes - ((answer->command >> 2) & 0x03);
         bytes_.assign(answer->data.begin(),
                       answer->data.begin() + static_cast<std::ptrdiff_t>(size));
         phase_ = Phase::idle;
@@ -107,12 +101,12 @@ std::optional<Frame> SdoClient::feed(const Frame& frame) {
     case Phase::upload: {
       if (command != 0) return give_up(SdoAbort::command);
       if (toggled != toggle_) return give_up(SdoAbort::toggle);
-      const std::size_t size = kSegmentSize - ((answer->command >> 1) & 0x07);
+      const std::size_t size = kSdoSegmentBytes - ((answer->command >> 1) & 0x07);
       bytes_.insert(bytes_.end(), frame.data.begin() + 1,
                     frame.data.begin() + 1 + static_cast<std::ptrdiff_t>(size));
       if (bytes_.size() > announced_.value_or(kLongest)) return give_up(SdoAbort::too_long);
       toggle_ = !toggle_;
-      if (!(answer->command & kLastBit)) return next_upload();
+      if (!(answer->command & kSdoLast)) return next_upload();
       if (announced_ && bytes_.size() != *announced_) return give_up(SdoAbort::length);
       phase_ = Phase::idle;
       return std::nullopt;

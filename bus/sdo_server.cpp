@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "bus/messages.hpp"
+#include "bus/sdo.hpp"
 
 namespace vcnc {
 
@@ -12,8 +13,7 @@ namespace {
 constexpr int kDownloadSegment = 0, kBeginDownload = 1, kBeginUpload = 2, kUploadSegment = 3,
               kClientAborts = 4;
 constexpr std::uint8_t kDownloadBegun = 0x60, kSegmentTaken = 0x20, kUploadBegun = 0x41,
-                       kExpedited = 0x43, kAborted = 0x80, kToggle = 0x10, kLast = 0x01;
-constexpr std::size_t kExpeditedBytes = 4, kSegmentBytes = 7;
+                       kExpedited = 0x43, kAborted = 0x80;
 
 }  // namespace
 
@@ -36,9 +36,10 @@ Frame SdoServer::begin_download(const Frame& request) {
   announced_.reset();
   bytes_.clear();
   if (expedited) {
-    std::size_t size = kExpeditedBytes - ((m.command >> 2) & 0x03);
+    std::size_t size = kSdoExpeditedBytes - ((m.command >> 2) & 0x03);
     if (!sized && entry != nullptr)  // then the object says how many of the four bytes count
-      size = std::min<std::size_t>(kExpeditedBytes, static_cast<std::size_t>(size_of(entry->type)));
+      size =
+          std::min<std::size_t>(kSdoExpeditedBytes, static_cast<std::size_t>(size_of(entry->type)));
     bytes_.assign(m.data.begin(), m.data.begin() + static_cast<std::ptrdiff_t>(size));
     const SdoAbort refused = objects_.write(index_, sub_, bytes_);
     if (refused != SdoAbort::none) return abort(refused);
@@ -63,20 +64,20 @@ Frame SdoServer::begin_download(const Frame& request) {
 Frame SdoServer::download_segment(const Frame& request) {
   if (transfer_ != Transfer::download) return abort(SdoAbort::command);
   const std::uint8_t command = request.data[0];
-  if (((command & kToggle) != 0) != toggle_) return abort(SdoAbort::toggle);
-  const std::size_t size = kSegmentBytes - ((command >> 1) & 0x07);
+  if (((command & kSdoToggle) != 0) != toggle_) return abort(SdoAbort::toggle);
+  const std::size_t size = kSdoSegmentBytes - ((command >> 1) & 0x07);
   bytes_.insert(bytes_.end(), request.data.begin() + 1,
                 request.data.begin() + 1 + static_cast<std::ptrdiff_t>(size));
   if (bytes_.size() > announced_.value_or(ObjectDictionary::kLongestText))
     return abort(SdoAbort::too_long);
-  if (command & kLast) {
+  if (command & kSdoLast) {
     if (announced_ && bytes_.size() != *announced_) return abort(SdoAbort::length);
     const SdoAbort refused = objects_.write(index_, sub_, bytes_);
     if (refused != SdoAbort::none) return abort(refused);
     transfer_ = Transfer::none;
   }
   Frame answer = encode_sdo_answer({.node = node_, .command = kSegmentTaken});
-  if (toggle_) answer.data[0] |= kToggle;
+  if (toggle_) answer.data[0] |= kSdoToggle;
   toggle_ = !toggle_;
   return answer;
 }
@@ -85,8 +86,9 @@ Frame SdoServer::begin_upload() {
   const SdoAbort refused = objects_.read(index_, sub_, bytes_);
   if (refused != SdoAbort::none) return abort(refused);
   SdoMessage answer{.node = node_, .command = kUploadBegun, .index = index_, .sub = sub_};
-  if (!bytes_.empty() && bytes_.size() <= kExpeditedBytes) {
-    answer.command = static_cast<std::uint8_t>(kExpedited | (kExpeditedBytes - bytes_.size()) << 2);
+  if (!bytes_.empty() && bytes_.size() <= kSdoExpeditedBytes) {
+    answer.command =
+        static_cast<std::uint8_t>(kExpedited | (kSdoExpeditedBytes - bytes_.size()) << 2);
     std::copy(bytes_.begin(), bytes_.end(), answer.data.begin());
   } else {
     answer.data[0] = static_cast<std::uint8_t>(bytes_.size());
@@ -100,16 +102,16 @@ Frame SdoServer::begin_upload() {
 
 Frame SdoServer::upload_segment(const Frame& request) {
   if (transfer_ != Transfer::upload) return abort(SdoAbort::command);
-  if (((request.data[0] & kToggle) != 0) != toggle_) return abort(SdoAbort::toggle);
-  const std::size_t size = std::min(kSegmentBytes, bytes_.size() - sent_);
+  if (((request.data[0] & kSdoToggle) != 0) != toggle_) return abort(SdoAbort::toggle);
+  const std::size_t size = std::min(kSdoSegmentBytes, bytes_.size() - sent_);
   Frame answer = encode_sdo_answer({.node = node_});
-  answer.data[0] = static_cast<std::uint8_t>((kSegmentBytes - size) << 1);
-  if (toggle_) answer.data[0] |= kToggle;
+  answer.data[0] = static_cast<std::uint8_t>((kSdoSegmentBytes - size) << 1);
+  if (toggle_) answer.data[0] |= kSdoToggle;
   std::copy_n(bytes_.begin() + static_cast<std::ptrdiff_t>(sent_), size, answer.data.begin() + 1);
   sent_ += size;
   toggle_ = !toggle_;
   if (sent_ == bytes_.size()) {
-    answer.data[0] |= kLast;
+    answer.data[0] |= kSdoLast;
     transfer_ = Transfer::none;
   }
   return answer;

@@ -5,7 +5,6 @@ namespace vcnc {
 namespace {
 
 constexpr Tick kOutageSettleCycles = 100;
-constexpr double kOrientSeconds = 0.2;
 
 }  // namespace
 

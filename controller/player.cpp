@@ -29,7 +29,6 @@ constexpr double kLongestTraverse = 36000;  ///< [s] at the limits of the axes
 constexpr double kExactCorner = 1.0 * kDegree;
 constexpr double kLargestChord = 2 * kPi / 3;  ///< angle of a chord
 constexpr int kMostChords = 20'000;            ///< per arc
-constexpr double kOrientFromRest = 0.2;        ///< from a standing spindle into its M19 position
 
 /// About how far the controlled point goes in a move [m].
 double way_of(const Move& move) {
@@ -913,7 +912,7 @@ struct Player::State {
     step.spindle_speed = word.speed;
     surface = word.surface;
     begin_wait(change / machine.spindle.acceleration +
-               (word.mode == Mode::orient ? kOrientFromRest : 0));
+               (word.mode == Mode::orient ? kOrientSeconds : 0));
   }
 
   /// Before a probing move: its reading is that of axes at rest, or is waited for.

@@ -17,6 +17,9 @@
 
 namespace vcnc {
 
+/// From a standing spindle into its M19 position [s].
+inline constexpr double kOrientSeconds = 0.2;
+
 /// What the machine shall do in one cycle.
 struct PlayerStep {
   enum class Spindle { off, clockwise, counter_clockwise, orient };

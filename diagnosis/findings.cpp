@@ -29,8 +29,6 @@ constexpr double kSilent = 1.005, kMostExplained = 0.9;
 /// Times the noise by which a signal is off for something that is there, and part of what it was
 /// off by before that a model of what was found may be wrong by.
 constexpr double kLoud = 1.5, kWrongOfFound = 0.05;
-/// Part of all chi-square from which on what explains it cannot be as declared.
-constexpr double kMostOfAll = 0.5;
 constexpr double kFewSamples = 200;
 /// Part of the noise's chi-square that no law is sought in.
 constexpr double kFloorScatter = 0.04;
@@ -204,7 +202,7 @@ class Report {
         if (n.whole) e.numbers.push_back({n.key, value, value, value});
       }
       e.gain = a.gain;
-      if (a.gain < kMostOfAll * selection_.base.held_out && may_be_as_declared(a, e.numbers)) {
+      if (may_be_as_declared(a, e.numbers)) {
         withhold(candidate, "fits, but may be as declared");
         continue;
       }
@@ -223,7 +221,8 @@ class Report {
       const auto released = std::find_if(found().released.begin(), found().released.end(),
                                          [&](const ReleasedNumber& r) { return r.key == key; });
       if (released == found().released.end()) {
-        if (!n.common() && std::abs(n.pull()) > options_.out_of_tolerance)
+        if (!n.common() && !key.starts_with("effects.setup.") &&
+            std::abs(n.pull()) > options_.out_of_tolerance)
           d_.notes.push_back(fmt::format(
               "{} fits best at {:.4g}, {:.1f} tolerances from what is declared ({:.4g}), but that "
               "explains too little to count.",

@@ -4,8 +4,10 @@
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <sys/wait.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -339,6 +341,45 @@ TEST(Hub, ErrorsAreClear) {
             std::string::npos);
   HubTransport tap(dir.file("bus"), kTapId), second_tap(dir.file("bus"), kTapId);
   EXPECT_NE(message([&] { tap.send({}); }).find("cannot send"), std::string::npos);
+}
+
+/// A process that is stopped while it waits for its welcome hears it when it goes on.
+TEST(Hub, AClientStoppedBeforeItsWelcomeIsWelcome) {
+  toy::SocketDir dir;
+  const std::string path = dir.file("bus");
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strcpy(address.sun_path, path.c_str());
+  const int listener = ::socket(AF_UNIX, SOCK_SEQPACKET, 0);
+  ASSERT_EQ(::bind(listener, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  ASSERT_EQ(::listen(listener, 1), 0);
+  const pid_t client = ::fork();
+  if (client == 0) {
+    try {
+      HubTransport node(path, 1);
+      _exit(0);
+    } catch (const BusError&) {
+      _exit(1);
+    }
+  }
+  const int served = ::accept(listener, nullptr, nullptr);
+  char hello[5];
+  ASSERT_EQ(::recv(served, hello, sizeof hello, 0), 5);
+  int status = 0;
+  for (int i = 0; i < 3; ++i) {
+    dawdle(5);  // now it listens
+    ::kill(client, SIGSTOP);
+    ASSERT_EQ(::waitpid(client, &status, WUNTRACED), client);
+    ASSERT_TRUE(WIFSTOPPED(status)) << status;
+    ::kill(client, SIGCONT);
+  }
+  dawdle(5);
+  const char welcome = 0;
+  ::send(served, &welcome, 1, MSG_NOSIGNAL);
+  ASSERT_EQ(::waitpid(client, &status, 0), client);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+  ::close(served);
+  ::close(listener);
 }
 
 TEST(Hub, FileOfAKilledHubIsReplaced) {

@@ -361,6 +361,31 @@ TEST(Diagnose, NotesWhatIsOfNoConsequence) {
   EXPECT_EQ(more.effects[0].name, "coulomb");
 }
 
+/// A number far outside of its tolerance is a finding if that explains enough, else a note.
+TEST(Diagnose, NotesAPullThatExplainsTooLittle) {
+  Machine declared;
+  declared.uncertainties = {{"axes.X.load_kg", 0.1, {}}};
+  const auto so_much = [&](double off_kg, double release_gain) {
+    const Record record = measured(toy::machine({{"axes.X.load_kg", 500 + off_kg}}), 33);
+    toy::ToyReplica replica(record);
+    DiagnosisOptions options;
+    options.release_gain = release_gain;
+    return diagnose({record, replica, declared, toy::candidates()}, options);
+  };
+  const double usual = DiagnosisOptions{}.release_gain;
+  const Diagnosis found = so_much(1, usual);
+  ASSERT_EQ(found.effects.size(), 1U) << to_text(found);
+  EXPECT_EQ(found.effects[0].place, "axes.X.load_kg");
+  EXPECT_TRUE(found.notes.empty()) << found.notes[0];
+  const Diagnosis noted = so_much(1, 1e5);
+  EXPECT_TRUE(noted.effects.empty());
+  ASSERT_EQ(noted.notes.size(), 1U) << to_text(noted);
+  EXPECT_EQ(noted.notes[0].find("axes.X.load_kg fits best at 500.6, 6.0 tolerances"), 0U)
+      << noted.notes[0];
+  EXPECT_NE(noted.notes[0].find("explains too little to count"), std::string::npos);
+  EXPECT_TRUE(so_much(0.3, usual).notes.empty());
+}
+
 TEST(Diagnose, PutsBackNumbersThatAreNotNeeded) {
   // A candidate of two numbers, of which the machine has one.
   std::vector<Candidate> all = toy::candidates();

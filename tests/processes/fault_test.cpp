@@ -183,8 +183,9 @@ TEST_F(FaultyProcesses, RandomFaultsAreThoseOfTheSeed) {
 TEST_F(FaultyProcesses, ASlowModuleDoesNotChangeTheHash) {
   write_text(scratch_ / "moving.ngc", "G90 G21\nM19\nG43.4 H1\nG1 X30 Y20 A3 C4 F6000\nM30\n");
   ASSERT_EQ(run("reference", "--in-process").code, 0);
-  ASSERT_EQ(run("slow", "--fault \"drive Y slow wall_s=0\" --fault \"probe slow wall_s=0.1\"").code,
-            0);
+  const Said slow =
+      run("slow", "--fault \"drive Y slow wall_s=0\" --fault \"probe slow wall_s=0.1\"");
+  ASSERT_EQ(slow.code, 0) << slow.err;
   EXPECT_EQ(json_value(summary("slow"), "trace_hash"),
             json_value(summary("reference"), "trace_hash"));
 }
