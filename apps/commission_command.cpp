@@ -24,7 +24,7 @@ namespace vcnc {
 int commission_command(const CommissionOptions& options) {
   keep_memory();
   catch_stop_signals();
-  const Record record = load_record(options.run, options.map);
+  const Record record = load_record(options.run, options.map, options.model);
   const Machine declared = declared_machine(options.model, record);
   std::error_code error;
   if (!options.model.empty() && std::filesystem::equivalent(options.model, options.out, error))

@@ -37,8 +37,9 @@ std::unique_ptr<MachineReplica> replica_of(const Record& record, const Machine& 
   }
   if (replica->channels().empty())
     throw InputError(record.source +
-                     ": holds nothing that can be predicted: a position, twist or force needs the "
-                     "command or a position of its axis, a deflection those of all axes");
+                     ": holds nothing that can be predicted: a position needs the command of its "
+                     "axis, a twist or force its command or position, a deflection those of all "
+                     "axes");
   check_readings(record, replica->channels(), replica->predict(declared));
   return replica;
 }
@@ -63,7 +64,7 @@ void predict_tests(const DiagnoseOptions& options, const std::optional<HealthyRu
                    std::vector<SignalFigure>& figures) {
   for (const std::string& test : options.tests) {
     if (stop_requested()) return;
-    const Record record = load_record(test, options.map);
+    const Record record = load_record(test, options.map, options.model);
     const bool beside = healthy && same_program(record, healthy->record);
     append_figures(figures, record, beside ? &*healthy : nullptr, declared, found, test);
   }
@@ -72,7 +73,7 @@ void predict_tests(const DiagnoseOptions& options, const std::optional<HealthyRu
 /// Nothing without --reference.
 std::optional<HealthyRun> reference_run(const DiagnoseOptions& options, const Machine& declared) {
   if (options.reference.empty()) return std::nullopt;
-  const Record record = load_record(options.reference, options.map);
+  const Record record = load_record(options.reference, options.map, options.model);
   return healthy_run(record, *replica_of(record, declared), declared);
 }
 
@@ -137,7 +138,7 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
 int diagnose_command(const DiagnoseOptions& options) {
   keep_memory();
   catch_stop_signals();
-  const Record record = load_record(options.run, options.map);
+  const Record record = load_record(options.run, options.map, options.model);
   const Machine declared = declared_machine(options.model, record);
   if (!options.compare.empty()) {
     if (!(options.out.empty() && options.suspects.empty() && options.without.empty()))
@@ -154,7 +155,7 @@ int diagnose_command(const DiagnoseOptions& options) {
         "encoder");
   // What cannot be predicted is refused before anything is sought.
   for (const std::string& test : options.tests) {
-    const Record predicted = load_record(test, options.map);
+    const Record predicted = load_record(test, options.map, options.model);
     check_same_kinematics(record, predicted);
     replica_of(predicted, declared);
   }

@@ -214,6 +214,7 @@ class Report {
       if (negligible(e, without, less)) continue;
       e.acquisition = of_measurement(e.name);
       tell_class(e, a.class_with);
+      tell_bounds(a.numbers);
       d_.effects.push_back(std::move(e));
     }
     for (const FreedNumber& n : found().nuisances.numbers) {
@@ -251,6 +252,20 @@ class Report {
       d_.effects.push_back(std::move(e));
     }
     if (withheld_ || !put_back_.empty()) fit_what_is_told();
+  }
+
+  /// A number that would go on if it might is of something else.
+  void tell_bounds(const std::vector<FreedNumber>& numbers) {
+    constexpr double kAtBound = 1e-3;  // of the range
+    for (const FreedNumber& n : numbers) {
+      const double range = n.number.max - n.number.min;
+      if (n.number.whole || is_phase(n.number) || n.value < n.number.max - kAtBound * range)
+        continue;
+      d_.warnings.push_back(
+          fmt::format("{} went to the end of what is allowed, {:.4g}: it is no size that such an "
+                      "effect has, and what is there is probably something else.",
+                      n.number.key, n.number.max));
+    }
   }
 
   void tell_class(FoundEffect& e, const std::vector<std::size_t>& others) const {
@@ -669,6 +684,9 @@ class Report {
       for (std::size_t c = 0; c < channels.size(); ++c)
         d_.figures.push_back({channels[c], name, evidence_.rms(before, c, role),
                               evidence_.rms(after, c, role), evidence_.noise_left(c)});
+    if (d_.effects.empty()) return;
+    const std::vector<std::string> worse = signals_made_worse(d_.figures);
+    d_.warnings.insert(d_.warnings.end(), worse.begin(), worse.end());
   }
 
   void tell_ladder() {
@@ -744,6 +762,21 @@ class Report {
 };
 
 }  // namespace
+
+std::vector<std::string> signals_made_worse(const std::vector<SignalFigure>& figures) {
+  constexpr double kWorse = 1.25;
+  std::vector<std::string> sentences;
+  for (const SignalFigure& f : figures) {
+    if (f.run != "held-out laps" || f.after <= kWorse * f.before || f.after <= kLoud * f.floor)
+      continue;
+    const ShownUnit unit = shown_unit(f.channel);
+    sentences.push_back(fmt::format(
+        "With what was added {} is further off than without, {:.3g} {} instead of "
+        "{:.3g}: it cannot be all of what is there, and may be none of it.",
+        channel_name(f.channel), f.after * unit.factor, unit.name, f.before * unit.factor));
+  }
+  return sentences;
+}
 
 Diagnosis findings_of(const DiagnosisCase& of, const Evidence& evidence,
                       const DiagnosisOptions& options, SelectionResult selection,

@@ -20,11 +20,15 @@
 // Without repeated motions noise is what the past of a remainder does not foretell of it
 // (noise_audit.hpp), and the words are the same.
 //
+// An effect that makes a signal worse, or a number that went to the end of what is allowed, is a
+// warning: it cannot be all of what is there.
+//
 // What moves the contour by less than 0.01 um and every signal by less than a tenth of its noise is
 // a note, not an effect.
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "diagnosis/diagnosis_case.hpp"
@@ -42,6 +46,11 @@ struct FoundBeforehand {
   std::optional<PeriodSlip> slip;
   std::vector<Chatter> chatter;
 };
+
+/// A sentence about each signal that is further off on held-out laps, by a quarter and by 1.5 times
+/// its noise, than before effects were added: what is there improves no signal at the cost of
+/// another.
+std::vector<std::string> signals_made_worse(const std::vector<SignalFigure>& figures);
 
 Diagnosis findings_of(const DiagnosisCase& of, const Evidence& evidence,
                       const DiagnosisOptions& options, SelectionResult selection,

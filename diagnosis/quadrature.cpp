@@ -21,6 +21,15 @@ constexpr int kPhaseBins = 36;
 constexpr double kLeastGain = 25;
 /// Of the radius about the middle, in shares of its mean; noise alone has 0.52 (Rayleigh).
 constexpr double kLargestScatter = 0.3;
+/// Samples whose radius is off the median by more than this share are outliers if they are few.
+constexpr double kFarRadius = 0.5, kMostOutliers = 0.01;
+/// Of a middle off zero, over the amplitude: no offset of an encoder is that large.
+constexpr double kOffCentre = 0.7;
+/// Share of the amplitude, either way, from which on its change is told.
+constexpr double kToldAmplitude = 0.003;
+/// Parts of a record over which an amplitude may change, and periods that each has at least.
+constexpr std::size_t kMostParts = 80;
+constexpr double kPartPeriods = 8;
 /// 97.5 % of Student's t with as many degrees of freedom as blocks less numbers.
 constexpr double kStudent = 2.03;
 
@@ -94,9 +103,28 @@ class ChannelFit {
     for (std::size_t i = 0; i < there.size(); i += stride)
       samples_.push_back({{cosine.value[there[i]], sine.value[there[i]]},
                           std::min(kBlocks - 1, i * kBlocks / there.size())});
+    leave_out_outliers();
   }
 
   std::size_t size() const { return samples_.size(); }
+  std::size_t outliers() const { return outliers_; }
+
+  /// Takes out an amplitude that changes along the record, slower than within kPartPeriods; tells
+  /// by which share of its mean it does so, either way.
+  double level_amplitude() {
+    std::vector<double> whole(samples_.size(), 1);
+    for (int i = 0; i < 3; ++i) {
+      const std::vector<double> level = amplitude_levels();
+      if (level.empty()) return 0;
+      for (std::size_t k = 0; k < level.size(); ++k) {
+        whole[k] *= level[k];
+        samples_[k].signals.u /= level[k];
+        samples_[k].signals.w /= level[k];
+      }
+    }
+    const auto [least, most] = std::minmax_element(whole.begin(), whole.end());
+    return (*most - *least) / (*most + *least);
+  }
 
   /// The ideal circle of the signals' own size.
   Numbers circle() const {
@@ -108,7 +136,8 @@ class ChannelFit {
     return x;
   }
 
-  /// Sectors of 30 deg, about the middle of the signals, that hold samples.
+  /// Sectors of 30 deg, about the middle of the signals, that hold samples; -1: the signals do not
+  /// keep to a circle.
   int sectors() const {
     double u_low = HUGE_VAL, u_high = -HUGE_VAL, w_low = HUGE_VAL, w_high = -HUGE_VAL;
     for (const auto& [s, block] : samples_) {
@@ -126,8 +155,19 @@ class ChannelFit {
     }
     const double mean = sum / static_cast<double>(size());
     const double variance = square / static_cast<double>(size()) - mean * mean;
-    if (variance > kLargestScatter * kLargestScatter * mean * mean) return 0;  // noise at rest
+    if (variance > kLargestScatter * kLargestScatter * mean * mean) return -1;
     return static_cast<int>(std::count(seen.begin(), seen.end(), true));
+  }
+
+  /// How far the middle of the signals is off zero, over their amplitude.
+  double off_centre() const {
+    double u_low = HUGE_VAL, u_high = -HUGE_VAL, w_low = HUGE_VAL, w_high = -HUGE_VAL;
+    for (const auto& [s, block] : samples_) {
+      u_low = std::min(u_low, s.u), u_high = std::max(u_high, s.u);
+      w_low = std::min(w_low, s.w), w_high = std::max(w_high, s.w);
+    }
+    const double amplitude = std::max(u_high - u_low, w_high - w_low) / 2;
+    return std::max(std::abs(u_low + u_high), std::abs(w_low + w_high)) / 2 / amplitude;
   }
 
   /// Which blocks count: those that are fitted (even), held out (odd), or all.
@@ -250,6 +290,76 @@ class ChannelFit {
   }
 
  private:
+  /// A few samples far off the circle of all others.
+  void leave_out_outliers() {
+    if (samples_.empty()) return;
+    const auto median = [](std::vector<double> v) {
+      const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
+      std::nth_element(v.begin(), middle, v.end());
+      return *middle;
+    };
+    const auto radii = [&](double u, double w) {
+      std::vector<double> r;
+      for (const Sample& s : samples_) r.push_back(std::hypot(s.signals.u - u, s.signals.w - w));
+      return r;
+    };
+    std::vector<double> u, w;
+    for (const Sample& s : samples_) u.push_back(s.signals.u), w.push_back(s.signals.w);
+    const std::vector<double> r = radii(median(u), median(w));
+    const double usual = median(r);
+    const auto far = [&](double radius) { return std::abs(radius - usual) > kFarRadius * usual; };
+    outliers_ = static_cast<std::size_t>(std::count_if(r.begin(), r.end(), far));
+    if (static_cast<double>(outliers_) > kMostOutliers * static_cast<double>(r.size()))
+      outliers_ = 0;
+    if (outliers_ == 0) return;
+    std::size_t k = 0;
+    std::erase_if(samples_, [&](const Sample&) { return far(r[k++]); });
+  }
+
+  /// Amplitude at each sample over its mean, by straight lines between parts of the record; empty:
+  /// it passes too few periods to tell.
+  std::vector<double> amplitude_levels() const {
+    Mask everything;
+    everything.fill(true);
+    const Numbers first = fit(circle(), mask_of({}), Part::all).value_or(circle());
+    const SignalCurve curve = curve_of(fit(first, everything, Part::all).value_or(first));
+    std::vector<Foot> feet;
+    double passed = 0;
+    for (const Sample& s : samples_) {
+      feet.push_back(foot_of(curve, s.signals));
+      if (feet.size() > 1)
+        passed += std::abs(std::remainder(feet.back().phi - feet[feet.size() - 2].phi, 2 * kPi));
+    }
+    const std::size_t n = feet.size(),
+                      parts = std::min(kMostParts,
+                                       static_cast<std::size_t>(passed / (2 * kPi * kPartPeriods)));
+    if (parts < 3) return {};
+    std::vector<std::pair<double, double>> levels;  // middle of a part, its level
+    for (std::size_t p = 0; p < parts; ++p) {
+      const std::size_t begin = p * n / parts, end = (p + 1) * n / parts;
+      std::array<double, kPhaseBins> sum{}, count{};
+      for (std::size_t k = begin; k < end; ++k) {
+        const auto bin = static_cast<std::size_t>(bin_of(feet[k].phi));
+        sum[bin] += feet[k].distance, ++count[bin];
+      }
+      if (std::count(count.begin(), count.end(), 0.0) > 0) continue;  // not a whole period
+      double mean = 0;
+      for (std::size_t b = 0; b < count.size(); ++b) mean += sum[b] / count[b] / kPhaseBins;
+      levels.emplace_back(static_cast<double>(begin + end - 1) / 2, 1 + mean / curve.amplitude);
+    }
+    if (levels.size() < 3) return {};
+    std::vector<double> result;
+    std::size_t i = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+      const auto at = static_cast<double>(k);
+      while (i + 2 < levels.size() && at > levels[i + 1].first) ++i;
+      const auto [x, y] = levels[i];
+      const auto [x_next, y_next] = levels[i + 1];
+      result.push_back(std::lerp(y, y_next, std::clamp((at - x) / (x_next - x), 0.0, 1.0)));
+    }
+    return result;
+  }
+
   static int bin_of(double phi) {
     const double turn = phi / (2 * kPi) - std::floor(phi / (2 * kPi));
     return std::min(kPhaseBins - 1, static_cast<int>(turn * kPhaseBins));
@@ -292,6 +402,7 @@ class ChannelFit {
   }
 
   std::vector<Sample> samples_;
+  std::size_t outliers_ = 0;
 };
 
 using Part = ChannelFit::Part;
@@ -418,21 +529,45 @@ Diagnosis diagnose_quadrature(const Record& record, const Machine& declared) {
     if (cosine.kind != SignalKind::cosine || cosine.axis > 2) continue;
     const MeasuredSignal* sine = record.find(SignalKind::sine, cosine.axis);
     if (!sine) continue;
-    const ChannelFit data(cosine, *sine);
+    ChannelFit data(cosine, *sine);
     const char name = kComponent[cosine.axis];
     if (data.size() < kFewest) {
       d.warnings.push_back(fmt::format("channel {}: {} samples are too few, {} are needed", name,
                                        data.size(), kFewest));
       continue;
     }
-    if (const int sectors = data.sectors(); sectors < 12) {
+    const int sectors = data.sectors();
+    if (sectors < 0) {
+      d.warnings.push_back(
+          fmt::format("channel {}: sine and cosine do not draw a circle (noise at rest, less than "
+                      "a period, the "
+                      "same signal twice, or signals that are none of an encoder)",
+                      name));
+      continue;
+    }
+    if (sectors < 12) {
       d.warnings.push_back(fmt::format(
-          "channel {}: the signals pass {} of 12 sectors of their period only; the encoder must "
-          "move by at least one period",
+          "channel {}: the samples lie in {} of 12 sectors of the signals' period only; the "
+          "encoder "
+          "must move by a period and more, at changing speed where few samples fall in a period",
           name, sectors));
       continue;
     }
+    if (const double off = data.off_centre(); off > kOffCentre) {
+      d.warnings.push_back(
+          fmt::format("channel {}: the signals swing about {:.3g} of their amplitude, not about "
+                      "zero; give their offset in the map (si = (sign scale value + offset) unit)",
+                      name, off));
+      continue;
+    }
     ++channels;
+    if (data.outliers() > 0)
+      d.warnings.push_back(fmt::format(
+          "channel {}: {} samples lie far off all others and are left out", name, data.outliers()));
+    if (const double share = data.level_amplitude(); share > kToldAmplitude)
+      d.notes.push_back(fmt::format(
+          "channel {}: the amplitude changes by +-{:.2g} % along the record; that is taken out.",
+          name, 100 * share));
     const ChannelResult result = select(data);
     tell(data, result, cosine.axis, d);
     for (const double gain : result.gains) explained += gain;

@@ -14,6 +14,10 @@
 // from the number of samples. Then the mean residual over the phase, learnt on one half, must
 // explain nothing of the other: otherwise something repeats that these effects are not.
 //
+// Before that, a few samples far off all others are left out, and an amplitude that changes slowly
+// along the record is taken out: by straight lines between the means of the distance over parts of
+// eight periods and more.
+//
 // What moves samples along the curve only cannot be seen: a fifth harmonic (cos 5phi, sin 5phi) has
 // the distance cos 4phi of a third one.
 #pragma once

@@ -12,10 +12,10 @@
 
 namespace vcnc {
 
-Record load_record(const std::string& path, const std::string& map) {
+Record load_record(const std::string& path, const std::string& map, const std::string& model) {
   std::error_code ignored;
   const bool folder = std::filesystem::is_directory(path, ignored);
-  if (!map.empty() && !folder && !is_record_file(path)) return import_files(path, map);
+  if (!map.empty() && !folder && !is_record_file(path)) return import_files(path, map, model);
   if (!folder && !std::filesystem::exists(path, ignored))
     throw MeasurementError(path + ": no such file or folder");
   if (!folder && !looks_like_hdf5(path))

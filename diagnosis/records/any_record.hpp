@@ -8,9 +8,11 @@
 
 namespace vcnc {
 
-/// The folder of a run, its recording, a record of `vcnc import`, or, with a map, a table. Throws
-/// InputError naming the file and what is wrong with it.
-Record load_record(const std::string& path, const std::string& map = "");
+/// The folder of a run, its recording, a record of `vcnc import`, or, with a map, a table, which is
+/// checked against the machine file `model`, else the one that its map names. Throws InputError
+/// naming the file and what is wrong with it.
+Record load_record(const std::string& path, const std::string& map = "",
+                   const std::string& model = "");
 
 /// The machine file, or, without one, what the record says it was measured on. Throws
 /// MeasurementError where the record says neither, or that its machine carries its rotary axes

@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kSettling = 50e-3;      // [s] after a gap, until the drive has forgotten it
 constexpr double kStarting = 0.3;        // [s] after a begin in motion, the same
+constexpr double kFollowedReach = 3e-3;  // [s] to either side of a sample of what is followed
 constexpr double kStandingStart = 1e-4;  // [m/s or rad/s] below which a record begins at rest
 
 /// Fills what is missing by straight lines, constant beyond the ends; tells where.
@@ -30,6 +31,24 @@ std::vector<double> bridged(const std::vector<double>& value, std::vector<char>&
       result[j] = before + (after - before) * static_cast<double>(j - i + 1) / steps;
     for (std::size_t j = i; j < std::min(n, end + settling); ++j) known[j] = false;
     i = end;
+  }
+  return result;
+}
+
+/// Value at each sample of the cubic that fits those within `half` samples best; fewer at the ends.
+std::vector<double> by_cubics(const std::vector<double>& value, std::size_t half) {
+  const std::size_t n = value.size();
+  std::vector<double> result = value;
+  for (std::size_t i = 1; i + 1 < n; ++i) {
+    const std::size_t reach = std::min({half, i, n - 1 - i});
+    if (reach < 2) continue;
+    const auto m = static_cast<double>(reach);
+    double sum = 0;
+    for (std::size_t j = i - reach; j <= i + reach; ++j) {
+      const double off = static_cast<double>(j) - static_cast<double>(i);
+      sum += (3 * m * m + 3 * m - 1 - 5 * off * off) * value[j];
+    }
+    result[i] = 3 * sum / ((2 * m - 1) * (2 * m + 1) * (2 * m + 3));
   }
   return result;
 }
@@ -85,13 +104,18 @@ CommandedMotion commanded_motion(const Record& record) {
     motion.told[axis] = CommandedMotion::Told::command;
     if (signal == nullptr) {
       signal = record.find(SignalKind::position, axis);
-      motion.told[axis] = CommandedMotion::Told::position;
+      motion.followed[axis] = is_followed(record, axis);
+      if (!motion.followed[axis]) motion.told[axis] = CommandedMotion::Told::position;
     }
     if (signal == nullptr) {
       motion.told[axis] = CommandedMotion::Told::nothing;
       continue;
     }
     motion.position[axis] = bridged(signal->value, motion.known, settling);
+    if (motion.followed[axis])
+      motion.position[axis] =
+          by_cubics(motion.position[axis],
+                    static_cast<std::size_t>(std::round(kFollowedReach / record.period)));
     motion.velocity[axis] = spline_derivative(motion.position[axis], record.period);
     motion.force[axis] = forces(record, axis, motion.known, settling);
     if (motion.told[axis] != CommandedMotion::Told::command) continue;
@@ -99,9 +123,18 @@ CommandedMotion commanded_motion(const Record& record) {
       const auto starting = static_cast<std::size_t>(std::ceil(kStarting / record.period));
       std::fill_n(motion.known.begin(), std::min(starting, motion.known.size()), false);
     }
-    round_to(motion.position[axis], signal->resolution);
+    if (!motion.followed[axis]) round_to(motion.position[axis], signal->resolution);
   }
   return motion;
+}
+
+bool is_followed(const Record& record, std::size_t axis) {
+  const bool probed =
+      std::any_of(record.signals.begin(), record.signals.end(),
+                  [](const MeasuredSignal& s) { return s.kind == SignalKind::deflection; });
+  const auto has = [&](SignalKind kind) { return record.find(kind, axis) != nullptr; };
+  return !probed && !has(SignalKind::command) && has(SignalKind::position) &&
+         (has(SignalKind::twist) || has(SignalKind::force));
 }
 
 AxisVector CommandedMotion::start(const AxisVector& declared) const {

@@ -5,6 +5,12 @@
 // something. Velocity: derivative of the cubic spline (natural ends) through the positions; its
 // error is h^2/24 of a jump of the jerk between two samples and of order h^4 elsewhere. Source:
 // de Boor, A Practical Guide to Splines, 1978, ch. IV.
+//
+// An axis without a command, but with a position and a twist or a force, is *followed*: its drive
+// is told to go where it was measured, smoothed by a cubic over 3 ms to either side (the
+// acceleration is kept, what is faster than some 150 Hz is lost). Source: Savitzky and Golay,
+// Analytical Chemistry 36 (1964) 1627. Where there are readings of a probe, no axis is followed:
+// the pose is known better from the positions themselves.
 #pragma once
 
 #include <vector>
@@ -23,6 +29,7 @@ struct CommandedMotion {
     command
   };
   PerAxis<Told> told{};
+  PerAxis<bool> followed{};  ///< told is command, but made from where it was measured
   PerAxis<std::vector<double>> position, velocity;  ///< one per sample; empty where nothing is told
   PerAxis<std::vector<KnownForce>> force;           ///< one per sample; empty: none
   std::vector<char> known;  ///< false: bridged, soon after, or a begin in motion
@@ -31,6 +38,9 @@ struct CommandedMotion {
 };
 
 CommandedMotion commanded_motion(const Record& record);
+
+/// Whether the drive of an axis is told to go where it was measured.
+bool is_followed(const Record& record, std::size_t axis);
 
 /// Derivative of the natural cubic spline through equidistant values.
 std::vector<double> spline_derivative(const std::vector<double>& value, double period);

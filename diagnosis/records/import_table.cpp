@@ -231,17 +231,52 @@ class Importer {
     record_.signals.push_back(std::move(signal));
   }
 
+  bool commanded(std::size_t axis) const {
+    return record_.find(SignalKind::command, axis) != nullptr;
+  }
+
+  /// Whether of two measuring systems that of the load is the loop's. Without a command there is no
+  /// loop to be seen, and the motor is what moves.
+  bool closed_with_load(std::size_t axis) {
+    if (!commanded(axis)) return false;
+    if (declared_) return declared_->axes[axis].servo.feedback == ServoParams::Feedback::load;
+    warn(fmt::format(
+        "without a machine it is not known with which of the two measuring systems the "
+        "loop of {} is closed: taken is that of the motor; name the machine in the map, "
+        "or call the one position",
+        kAxisNames[axis]));
+    return false;
+  }
+
+  /// The only position of an axis must be that of its loop.
+  void check_one_position(std::size_t axis, Kind kind) const {
+    if (kind == Kind::position || !declared_ || !commanded(axis)) return;
+    const bool of_load = kind == Kind::load_position;
+    if (of_load == (declared_->axes[axis].servo.feedback == ServoParams::Feedback::load)) return;
+    throw MeasurementError(fmt::format(
+        "{}: the {}_position of {} alone cannot be compared: the loop of the declared machine is "
+        "closed with the {} (axes.{}.feedback); say there which it is, or call the column position "
+        "if it is that of the loop",
+        table_.source, of_load ? "load" : "motor", kAxisNames[axis], of_load ? "motor" : "load",
+        kAxisNames[axis]));
+  }
+
   /// Of two positions of one axis the second becomes the twist.
   void add_twists() {
     std::set<std::size_t> gone;
     for (const auto& [axis, of] : positions_) {
-      if (of.size() < 2) continue;
+      if (of.size() < 2) {
+        check_one_position(axis, of.begin()->first);
+        continue;
+      }
       const bool motor = of.contains(Kind::motor_position);
       const bool load = of.contains(Kind::load_position);
       // position is that of the motor, unless the motor has a column of its own.
       const std::size_t m = motor ? of.at(Kind::motor_position) : of.at(Kind::position);
       const std::size_t l = load ? of.at(Kind::load_position) : of.at(Kind::position);
-      const std::size_t closed = of.contains(Kind::position) ? of.at(Kind::position) : m;
+      const std::size_t closed = of.contains(Kind::position) ? of.at(Kind::position)
+                                 : closed_with_load(axis)    ? l
+                                                             : m;
       MeasuredSignal twist;
       twist.kind = SignalKind::twist;
       twist.axis = axis;
@@ -266,7 +301,9 @@ class Importer {
     for (const Stretch& s : record_.stretches) ++repetitions[s.condition];
     const bool repeated = std::any_of(repetitions.begin(), repetitions.end(),
                                       [](const auto& r) { return r.second > 1; });
-    if (!repeated)
+    const bool compared = std::any_of(record_.signals.begin(), record_.signals.end(),
+                                      [](const MeasuredSignal& s) { return is_compared(s.kind); });
+    if (!repeated && compared)
       warn("no motion is repeated: noise can only be estimated from the residual itself");
   }
 
@@ -354,17 +391,17 @@ Record import_table(const MeasuredTable& table, const ImportMap& map, const std:
   return Importer(table, map, map_name, declared).record();
 }
 
-Record import_files(const std::string& table, const std::string& map) {
+Record import_files(const std::string& table, const std::string& map, const std::string& model) {
   const ImportMap read = load_import_map(map);
-  std::optional<Machine> declared;
-  if (!read.machine.empty()) declared = load_machine(read.machine);
+  std::optional<Machine> named, declared;
+  if (!read.machine.empty()) named = load_machine(read.machine);
+  declared = model.empty() ? named : load_machine(model);
   const TextFormat format{.separator = read.separator, .missing = read.missing};
   Record record =
       import_table(read_measured_table(table, format), read, map, declared ? &*declared : nullptr);
-  if (declared) {
-    record.machine_toml = to_toml(*declared);
-    if (!declared->setup.piece.empty())
-      record.piece_toml = to_toml(load_piece(declared->setup.piece));
+  if (named) {
+    record.machine_toml = to_toml(*named);
+    if (!named->setup.piece.empty()) record.piece_toml = to_toml(load_piece(named->setup.piece));
   }
   return record;
 }

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "diagnosis/records/commanded_motion.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/records/signal_name.hpp"
 
@@ -99,7 +100,7 @@ class Checker {
     check_values();
     for (const MeasuredSignal& v : velocities_) check_velocity(v);
     for (const MeasuredSignal& s : record_.signals) {
-      if (s.kind == SignalKind::position) check_command(s);
+      if (s.kind == SignalKind::position) check_command(s), check_twist(s);
       if (s.kind == SignalKind::position || s.kind == SignalKind::command) check_range(s);
     }
     for (const MeasuredSignal& s : record_.signals)
@@ -144,10 +145,14 @@ class Checker {
       const bool told = s.kind == SignalKind::applied_force || s.kind == SignalKind::added_force;
       if (is_constant && s.kind != SignalKind::temperature && !told)
         warn(fmt::format("{} is constant; nothing can be learnt from it", name(s)));
-      if (told && !record_.find(SignalKind::command, s.axis))
+      if (told && !record_.find(SignalKind::command, s.axis) && !is_followed(record_, s.axis))
         warn(fmt::format("{} is not used: no command of {} is known", name(s), kAxisNames[s.axis]));
       if (is_constant) continue;
       s.resolution = resolution_of(s.value);
+      // What double precision leaves of a difference of two positions is no step.
+      if (const MeasuredSignal* p = record_.find(SignalKind::position, s.axis);
+          s.kind == SignalKind::twist && p && s.resolution < 1e-12 * spread_of(p->value).span())
+        s.resolution = 0;
       const double steps = s.resolution > 0 ? spread_of(s.value).span() / s.resolution : HUGE_VAL;
       if (steps < kFewestSteps && s.kind != SignalKind::temperature && !told)
         warn(fmt::format("{} comes in {:.0f} coarse steps of {:.3g} (SI)", name(s), steps,
@@ -221,9 +226,54 @@ class Checker {
                     speed_name(s), name(*own), r.correlation));
   }
 
+  /// Motor and load move alike, but for what twists and plays between them.
+  void check_twist(const MeasuredSignal& s) const {
+    const MeasuredSignal* twist = record_.find(SignalKind::twist, s.axis);
+    if (!twist) return;
+    const double span = spread_of(twist->value).span(), moved = spread_of(s.value).span();
+    if (!(span > 10 * kMoves && span > 0.5 * moved)) return;
+    std::vector<double> steps;
+    for (std::size_t k = 1; k < twist->value.size(); ++k)
+      if (const double d = std::abs(twist->value[k] - twist->value[k - 1]); std::isfinite(d))
+        steps.push_back(d);
+    if (steps.empty()) return;
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::nth_element(steps.begin(), middle, steps.end());
+    const double usual = *middle, jump = *std::max_element(middle, steps.end());
+    const char* unit = is_rotary(s.axis) ? "rad" : "m";
+    refuse(
+        fmt::format("load and motor differ by {:.4g} {} while {} moves by {:.4g}; {}", span, unit,
+                    name(s), moved,
+                    jump > kMoves && jump > 50 * usual
+                        ? fmt::format("one of them jumps by {:.4g} {}: an encoder that wraps must "
+                                      "be unrolled before",
+                                      jump, unit)
+                        : "check scale (gear, lead), sign and unit of the two positions"));
+  }
+
+  /// From where on, and how far, a command goes while its position stays as it is.
+  void check_stuck(const MeasuredSignal& s, const MeasuredSignal& command) const {
+    const double enough = std::max(10 * kMoves, 0.1 * spread_of(command.value).span());
+    std::size_t begin = 0;
+    Spread gone;
+    for (std::size_t k = 0; k < s.value.size(); ++k) {
+      if (k == 0 || s.value[k] != s.value[k - 1]) begin = k, gone = {};
+      if (!std::isfinite(command.value[k])) continue;
+      gone.low = std::min(gone.low, command.value[k]);
+      gone.high = std::max(gone.high, command.value[k]), ++gone.count;
+      if (gone.span() > enough)
+        refuse(fmt::format(
+            "{} stays at {:.6g} from {:.3f} s on while {} goes on: a measuring system "
+            "that failed, or a column that was not written",
+            name(s), s.value[k], record_.begin + static_cast<double>(begin) * record_.period,
+            name(command)));
+    }
+  }
+
   void check_command(const MeasuredSignal& s) {
     const MeasuredSignal* own = record_.find(SignalKind::command, s.axis);
-    if (!own || constant(own->value)) return;
+    if (!own) return tell_no_command(s.axis);
+    if (constant(own->value)) return;
     if (constant(s.value)) {
       const double span = spread_of(own->value).span();
       if (span > kMoves)
@@ -233,6 +283,7 @@ class Checker {
                         name(s), name(*own), span, is_rotary(s.axis) ? "rad" : "m"));
       return;
     }
+    check_stuck(s, *own);
     const Series moved = speed_of(s);
     const Relation r = relate(speed_of(*own), moved);
     if (!r.known) return;
@@ -256,6 +307,15 @@ class Checker {
     }
     warn(fmt::format("{} hardly follows {} (correlation of their speeds {:.2f})", name(s),
                      name(*own), r.correlation));
+  }
+
+  void tell_no_command(std::size_t axis) {
+    if (is_followed(record_, axis))
+      warn(
+          fmt::format("no command of {} is known: it is taken to be sent where it was measured; "
+                      "nothing can be learnt about its control loops, and laps are "
+                      "only known where the map gives them ([[laps]], lap_column)",
+                      kAxisNames[axis]));
   }
 
   /// A position comes after its command.
@@ -350,7 +410,23 @@ class Checker {
     return ForceFit{x[0], x[1], x[2], 1 - left / variance, (left_without - left) / variance};
   }
 
+  /// No drive gives five times what it can.
+  void check_force_limit(const MeasuredSignal& s) const {
+    if (!declared_) return;
+    const double limit = declared_->axes[s.axis].mechanics.force_limit;
+    const Spread spread = spread_of(s.value);
+    const double largest = std::max(std::abs(spread.low), std::abs(spread.high));
+    if (spread.count == 0 || largest <= 5 * limit) return;
+    const bool rotary = is_rotary(s.axis);
+    refuse(
+        fmt::format("{} reaches {:.4g} {}, the declared limit is {:.4g} (axes.{}.{}); check unit "
+                    "and scale of the force, and whether it is another column",
+                    name(s), largest, rotary ? "N m" : "N", limit, kAxisNames[s.axis],
+                    rotary ? "torque_limit_Nm" : "force_limit_N"));
+  }
+
   void check_force(const MeasuredSignal& s) {
+    check_force_limit(s);
     const MeasuredSignal* own = motion(s.axis);
     if (!own || constant(own->value) || constant(s.value)) return;
     const auto fit = fit_force(s, *own);

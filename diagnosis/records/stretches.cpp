@@ -28,7 +28,8 @@ class Curve5 {
  public:
   explicit Curve5(const Record& record) : motion_(commanded_motion(record)), h_(record.period) {
     for (std::size_t i = 0; i < kAxisCount; ++i)
-      if (motion_.told[i] == CommandedMotion::Told::command) axes_.push_back(i);
+      if (motion_.told[i] == CommandedMotion::Told::command && !motion_.followed[i])
+        axes_.push_back(i);
   }
   bool empty() const { return axes_.empty(); }
   double period() const { return h_; }

@@ -22,6 +22,7 @@ CommandedMotion at_cycles(const CommandedMotion& motion, double period) {
   if (std::abs(period - kCycleTime) < 1e-9) return motion;
   CommandedMotion result;
   result.told = motion.told;
+  result.followed = motion.followed;
   const std::size_t samples = motion.known.size();
   const double duration = static_cast<double>(samples - 1) * period;
   const auto cycles = static_cast<std::size_t>(std::floor(duration / kCycleTime + 1e-9)) + 1;
@@ -63,11 +64,32 @@ std::vector<ComparedChannel> channels_of(const Record& record, const CommandedMo
   std::vector<ComparedChannel> channels;
   for (const MeasuredSignal& signal : record.signals) {
     if (!is_compared(signal.kind)) continue;
+    if (signal.kind == SignalKind::position && motion.followed[signal.axis]) continue;
     if (signal.kind == SignalKind::deflection ||
         motion.told[signal.axis] == CommandedMotion::Told::command)
       channels.push_back({signal.kind, signal.axis});
   }
   return channels;
+}
+
+/// Of a drive that goes where its axis was measured, more closely than any that is recorded: its
+/// loops cross over as high as keeps them stable with what turns at the motor alone.
+ServoParams follower(const MechanicsParams& m) {
+  constexpr double kLeastHz = 80, kMostHz = 300, kMotorHz = 1000;
+  const double of_motor = 1 - m.load / m.total_inertia();
+  ServoParams servo;
+  servo.kv_per_s = 200;
+  servo.velocity_bandwidth = std::clamp(kMotorHz * of_motor, kLeastHz, kMostHz);
+  servo.integral_time = 5e-3;
+  servo.feedback = ServoParams::Feedback::motor;
+  return servo;
+}
+
+/// What sets the loops and the set-points of a drive says nothing of one that is followed.
+template <class Effect>
+constexpr bool is_of_loops() {
+  return std::is_same_v<typename Effect::Port, ServoPort> ||
+         std::is_same_v<typename Effect::Port, SetpointPort>;
 }
 
 /// a + factor b
@@ -174,12 +196,17 @@ MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine,
                                                          Encoders encoders) const {
   Hypothesis h;
   h.machine = as_hypothesis(declared_, machine);
-  for_each_effect_of(h.machine.effects, [&]<class Effect>(Effect& effect, std::size_t) {
+  for_each_effect_of(h.machine.effects, [&]<class Effect>(Effect& effect, std::size_t axis) {
     const bool stays =
         std::is_same_v<Effect, EncoderQuantisation> && encoders == Encoders::rounding;
-    if (is_chance<Effect>() && !stays) effect = Effect();
+    const bool unseen = is_of_loops<Effect>() && axis < kAxisCount && motion_.followed[axis];
+    if ((is_chance<Effect>() && !stays) || unseen) effect = Effect();
   });
   h.actual = vcnc::actual(h.machine);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (motion_.followed[axis])
+      h.machine.axes[axis].servo = h.actual.axes[axis].servo =
+          follower(declared_.axes[axis].mechanics);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     if (!motion_.position[axis].empty())
       h.machine.axes[axis].limits.start = h.actual.axes[axis].limits.start =

@@ -6,8 +6,10 @@
 // know (as_hypothesis).
 //
 // An axis that the record has no command of is taken to be where it was measured, or to stand where
-// the declared machine starts. Records at another rate than the bus cycle are brought to 1 ms by
-// the spline of the commands and back by straight lines.
+// the declared machine starts. Where its twist or force was recorded (and no reading of a probe),
+// an ideal drive moves it to where it was measured (CommandedMotion::followed): what its loops are
+// like is not seen then, and no position is compared. Records at another rate than the bus cycle
+// are brought to 1 ms by the spline of the commands and back by straight lines.
 //
 // What has been computed is kept and found again by what it depends on: changing something of X
 // does not simulate Y, changing the probe simulates no axis, and what only displaces the tool

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "diagnosis/records/any_record.hpp"
+#include "diagnosis/records/commanded_motion.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/records/signal_name.hpp"
 #include "diagnosis/search/evidence.hpp"
@@ -148,11 +149,18 @@ bool same_program(const Record& now, const Record& healthy) {
 
 DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
   check_known_forces(now, healthy.record);
+  for (const Record* of : {&now, &healthy.record})
+    if (of->stretches.empty())
+      throw MeasurementError(of->source +
+                             ": its laps are not known, and only laps of the same motion can be "
+                             "compared with a healthy run; give them in the map ([[laps]] or "
+                             "lap_column)");
   check_same_kinematics(now, healthy.record);
   DifferentialRecord result{.record = now, .noise = healthy.noise, .healthy = healthy.machine};
   std::size_t fewest = 0, unmatched = 0;
   for (MeasuredSignal& signal : result.record.signals) {
     if (!is_compared(signal.kind)) continue;
+    if (signal.kind == SignalKind::position && is_followed(now, signal.axis)) continue;
     const auto channel = std::find(healthy.channels.begin(), healthy.channels.end(),
                                    ComparedChannel{signal.kind, signal.axis});
     const MeasuredSignal* partner = healthy.record.find(signal.kind, signal.axis);

@@ -9,6 +9,7 @@
 
 #include "configs/config.hpp"
 #include "diagnosis/commission.hpp"
+#include "diagnosis/findings.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
 #include "diagnosis/search/period_slip_search.hpp"
@@ -386,6 +387,34 @@ TEST(Diagnose, NotesAPullThatExplainsTooLittle) {
   EXPECT_TRUE(so_much(0.3, usual).notes.empty());
 }
 
+TEST(Diagnose, WarnsOfANumberAtTheEndOfWhatIsAllowed) {
+  const Record record = measured(toy::machine({{"effects.X.coulomb.level_N", 300}}), 34);
+  toy::ToyReplica replica(record);
+  std::vector<Candidate> all = toy::candidates();
+  for (Candidate& c : all)
+    if (c.effect == "coulomb") c.numbers[0].max = 290;
+  std::erase_if(all, [](const Candidate& c) { return c.effect == "viscous"; });
+  const Diagnosis d = diagnose({record, replica, {}, all});
+  ASSERT_FALSE(d.effects.empty()) << to_text(d);
+  EXPECT_EQ(d.effects[0].name, "coulomb");
+  EXPECT_TRUE(std::any_of(d.warnings.begin(), d.warnings.end(), [](const std::string& w) {
+    return w.find("X.coulomb.level_N went to the end of what is allowed, 290") != std::string::npos;
+  })) << to_text(d);
+}
+
+TEST(Diagnose, WarnsWhereWhatWasAddedMakesASignalWorse) {
+  const auto figure = [](double before, double after, const char* run = "held-out laps") {
+    return SignalFigure{{SignalKind::position, 0}, run, before, after, 50e-9};
+  };
+  const auto said = signals_made_worse({figure(1e-7, 9e-7)});
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_EQ(said[0].find("With what was added position X is further off than without, 0.9 um "), 0U)
+      << said[0];
+  EXPECT_TRUE(signals_made_worse({figure(9e-7, 1e-7), figure(50e-9, 70e-9), figure(8e-7, 9e-7),
+                                  figure(1e-7, 9e-7, "fitted laps")})
+                  .empty());
+}
+
 TEST(Diagnose, PutsBackNumbersThatAreNotNeeded) {
   // A candidate of two numbers, of which the machine has one.
   std::vector<Candidate> all = toy::candidates();
@@ -513,6 +542,9 @@ TEST(Diagnose, ReferenceRunCancelsWhatTheModelGetsWrong) {
   const Diagnosis none = diagnose({well, of_well, declared, toy::candidates()},
                                   less_healthy(well, healthy_run(healthy, of_healthy, declared)));
   EXPECT_EQ(none.verdict, DiagnosisVerdict::no_deviation);
+  Record whole = well;  // laps nobody knows of cannot be compared
+  whole.stretches.clear();
+  EXPECT_THROW(less_healthy(whole, healthy_run(healthy, of_healthy, declared)), MeasurementError);
 }
 
 /// Far more than a reading is rough, but everywhere.

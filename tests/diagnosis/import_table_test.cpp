@@ -155,6 +155,87 @@ TEST(ImportTable, TwoEncodersOfARobotJointBecomePositionAndTwist) {
   EXPECT_EQ(twist->source, "load - motor");
 }
 
+/// Of two measuring systems the loop's is the position, as the declared machine says.
+TEST(ImportTable, ThePositionOfTwoIsThatOfTheDeclaredLoop) {
+  Columns all = columns();
+  all["motor"] = [](double t) { return LinearAxis::position(t - 0.004); };
+  all["scale"] = [](double t) { return LinearAxis::position(t - 0.004) + 1e-5 * std::sin(t); };
+  const MeasuredTable table = table_of(all);
+  const std::string both = kTime + signal("motor", "motor_position", "X", "m") +
+                           signal("scale", "load_position", "X", "m"),
+                    map = both + signal("cmd", "command", "X", "m");
+  Machine machine = declared();
+  const auto position_of = [&](const std::string& text, const Machine* of) {
+    const Record r = import_table(table, parse_import_map(text, "map.toml"), "map.toml", of);
+    EXPECT_NE(r.find(SignalKind::twist, 0), nullptr);
+    return r.find(SignalKind::position, 0)->source + (warned(r, "not known with which") ? "?" : "");
+  };
+  machine.axes[kX].servo.feedback = ServoParams::Feedback::load;
+  EXPECT_EQ(position_of(map, &machine), "scale");
+  EXPECT_EQ(position_of(both, &machine), "motor") << "no command, no loop";
+  machine.axes[kX].servo.feedback = ServoParams::Feedback::motor;
+  EXPECT_EQ(position_of(map, &machine), "motor");
+  EXPECT_EQ(position_of(map, nullptr), "motor?");
+  // One alone must be the loop's.
+  const std::string motor =
+      kTime + signal("cmd", "command", "X", "m") + signal("motor", "motor_position", "X", "m");
+  EXPECT_NO_THROW(import_table(table, parse_import_map(motor, "map.toml"), "map.toml", &machine));
+  const std::string refused = refusal(motor, table);  // the loop of declared() has a scale
+  EXPECT_NE(refused.find("axes.X.feedback"), std::string::npos) << refused;
+}
+
+TEST(ImportTable, TwoPositionsThatCannotBeOfOneAxisAreRefused) {
+  Columns all = columns();
+  all["motor"] = [](double t) {
+    return std::remainder(LinearAxis::position(t - 0.004), 0.010);  // an encoder of one turn
+  };
+  all["half"] = [](double t) { return 0.4 * LinearAxis::position(t - 0.004); };
+  const auto with = [&](const char* motor) {
+    return refusal(kTime + signal("cmd", "command", "X", "m") +
+                       signal("pos", "position", "X", "m") +
+                       signal(motor, "motor_position", "X", "m"),
+                   table_of(all));
+  };
+  EXPECT_NE(with("motor").find("wraps"), std::string::npos) << with("motor");
+  EXPECT_NE(with("half").find("check scale"), std::string::npos) << with("half");
+}
+
+TEST(ImportTable, APositionThatStopsWhileItsCommandGoesOnIsRefused) {
+  Columns all = columns();
+  all["pos"] = [](double t) { return LinearAxis::position(std::min(t, 3.0)); };
+  MeasuredTable table = table_of(all);
+  for (MeasuredColumn& c : table.columns)
+    if (c.name == "pos") std::fill(c.value.begin() + 3000, c.value.end(), c.value[3000]);
+  const std::string map =
+      kTime + signal("cmd", "command", "X", "m") + signal("pos", "position", "X", "m");
+  EXPECT_NE(refusal(map, table).find("from 3.000 s on"), std::string::npos) << refusal(map, table);
+}
+
+TEST(ImportTable, AForceFarBeyondTheDeclaredLimitIsRefused) {
+  const auto scaled = [](double scale) {
+    return refusal(kTime + signal("pos", "position", "X", "m") +
+                   signal("force", "force", "X", "N", fmt::format("scale = {}", scale)));
+  };
+  EXPECT_EQ(scaled(1), "");  // 130 N of 40000
+  EXPECT_NE(scaled(1e4).find("the declared limit is 4e+04 (axes.X.force_limit_N)"),
+            std::string::npos)
+      << scaled(1e4);
+}
+
+TEST(ImportTable, RoundingOfADifferenceIsNoResolution) {
+  MeasuredTable table = table_of(columns());
+  for (MeasuredColumn& c : table.columns)
+    if (c.name == "pos" || c.name == "pos2")
+      for (std::size_t k = 0; k < c.value.size(); ++k)
+        c.value[k] = 1e-6 * std::round(1e6 * LinearAxis::position(kStep * static_cast<double>(k))) +
+                     (c.name == "pos2" ? 3e-6 : 0);
+  const Record record = imported(
+      kTime + signal("pos", "motor_position", "X", "m") + signal("pos2", "load_position", "X", "m"),
+      table);
+  EXPECT_EQ(record.find(SignalKind::twist, 0)->resolution, 0);
+  EXPECT_NEAR(record.find(SignalKind::position, 0)->resolution, 1e-6, 1e-9);
+}
+
 TEST(ImportTable, GapsAndMissingValuesStayMissingAndAreTold) {
   MeasuredTable table = table_of(columns());
   for (MeasuredColumn& c : table.columns) {

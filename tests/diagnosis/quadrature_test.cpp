@@ -135,6 +135,45 @@ TEST(Quadrature, AnEncoderThatDoesNotMoveCannotBeJudged) {
   EXPECT_EQ(diagnose_quadrature(brief, Machine{}).verdict, DiagnosisVerdict::not_identifiable);
 }
 
+/// Half a wave of amplitude, and a few samples from elsewhere.
+TEST(Quadrature, AnAmplitudeThatChangesAndOutliersHideNothing) {
+  const SignalCurve truth{
+      .cosine_offset = 0.03, .sine_offset = -0.02, .gain = 0.05, .angle = 2 * kDegree};
+  Record record = encoder(truth, 6);
+  for (MeasuredSignal& s : record.signals)
+    for (std::size_t k = 0; k < s.value.size(); ++k)
+      s.value[k] *= 1 + 0.05 * std::sin(4e-4 * static_cast<double>(k));
+  for (const std::size_t k : {3000U, 3001U, 9000U, 15000U}) record.signals[0].value[k] = 4;
+  const Diagnosis d = diagnose_quadrature(record, Machine{});
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
+  const auto numbers = numbers_of(d);
+  const auto off = [&](const char* key, double expected) {
+    return std::abs(numbers.at(std::string("effects.probe.") + key + ".x").value - expected);
+  };
+  ASSERT_EQ(d.effects.size(), 3U);
+  EXPECT_LT(off("signal_offset.cosine_percent", 3), 0.02);
+  EXPECT_LT(off("signal_offset.sine_percent", -2), 0.02);
+  EXPECT_LT(off("signal_gain.gain_percent", 5), 0.02);
+  EXPECT_LT(off("signal_phase.angle_deg", 2), 0.02);
+  ASSERT_EQ(d.warnings.size(), 1U);
+  EXPECT_NE(d.warnings[0].find("4 samples lie far off"), std::string::npos) << d.warnings[0];
+  EXPECT_NE(d.notes[0].find("amplitude changes by +-5"), std::string::npos) << d.notes[0];
+}
+
+TEST(Quadrature, SignalsThatCannotBeThoseOfAnEncoderAreToldWhy) {
+  Record same = encoder({}, 1), counts = same;
+  same.signals[1].value = same.signals[0].value;
+  for (MeasuredSignal& s : counts.signals)
+    for (double& v : s.value) v = std::round(2048 + 2000 * v);
+  for (const auto& [record, why] :
+       {std::pair(&same, "do not draw a circle"), {&counts, "not about zero; give their offset"}}) {
+    const Diagnosis d = diagnose_quadrature(*record, Machine{});
+    EXPECT_EQ(d.verdict, DiagnosisVerdict::not_identifiable) << why;
+    ASSERT_EQ(d.warnings.size(), 1U) << why;
+    EXPECT_NE(d.warnings[0].find(why), std::string::npos) << d.warnings[0];
+  }
+}
+
 TEST(Quadrature, TheFoundMachineHasTheEffects) {
   const Diagnosis d = diagnose_quadrature(encoder({.gain = 0.05}, 2), Machine{});
   EXPECT_NEAR(d.found.effects.get<SignalGain>().gain.x(), 0.05, 5e-4);

@@ -315,6 +315,55 @@ TEST(MachineReplica, AnAxisWithoutCommandIsWhereItWasMeasured) {
   EXPECT_LT(misfit(run, replica, found, SignalKind::deflection).rms, 20e-9);
 }
 
+/// A joint of which motor, twist and force were recorded and no command: what its drive is like is
+/// not seen, what it carries is.
+TEST(MachineReplica, AnAxisWithoutCommandThatHasForceAndTwistIsFollowed) {
+  Machine machine = ideal_machine();
+  machine.axes[kC].servo.feedback = ServoParams::Feedback::motor;
+  auto& effects = machine.effects.axis[kC];
+  effects.get<Coulomb>() = Coulomb::nominal(true);
+  effects.get<Windup>() = Windup::nominal(true);
+  Record commanded;
+  MeasuredSignal told{SignalKind::command, kC, "", {}, 0};
+  for (int i = 0; i < 3000; ++i) told.value.push_back(0.5 * (1 - std::cos(2 * kPi * i / 1000)));
+  const std::vector<double> any(told.value.size(), 0.0);
+  commanded.signals = {told,
+                       {SignalKind::position, kC, "", any, 0},
+                       {SignalKind::force, kC, "", any, 0},
+                       {SignalKind::twist, kC, "", any, 0}};
+  const Prediction seen = MachineReplica(commanded, machine, std::nullopt).predict(machine);
+  Record record;
+  for (std::size_t c = 0; c < seen.size(); ++c)
+    record.signals.push_back({commanded.signals[c + 1].kind, kC, "", seen[c], 0});
+  ASSERT_TRUE(is_followed(record, kC));
+
+  Machine declared = machine;
+  declared.axes[kC].servo.kv_per_s = 17;  // nobody knows
+  const MachineReplica replica(record, declared, std::nullopt);
+  ASSERT_EQ(replica.channels(),
+            (std::vector<ComparedChannel>{{SignalKind::force, kC}, {SignalKind::twist, kC}}));
+  const auto rms_off = [&](const Prediction& p, std::size_t c) {
+    double sum = 0, square = 0;
+    for (std::size_t k = 400; k < any.size(); ++k) {  // it may begin in motion
+      sum += std::pow(p[c][k] - seen[c + 1][k], 2);
+      square += std::pow(seen[c + 1][k], 2);
+    }
+    return std::sqrt(sum / square);
+  };
+  const Prediction as_it_is = replica.predict(declared);
+  EXPECT_LT(rms_off(as_it_is, 0), 0.05);
+  EXPECT_LT(rms_off(as_it_is, 1), 0.05);
+  Machine other_loops = declared;
+  other_loops.effects.axis[kC].get<KvError>() = KvError::nominal(true);
+  other_loops.effects.axis[kC].get<CommandDelay>() = CommandDelay::nominal(true);
+  EXPECT_TRUE(same_bits(replica.predict(other_loops), as_it_is));
+  Machine without_friction = declared;
+  without_friction.effects.axis[kC].get<Coulomb>() = {};
+  EXPECT_GT(rms_off(replica.predict(without_friction), 0), 0.1);
+  record.signals.push_back({SignalKind::deflection, 0, "", any, 0});
+  EXPECT_FALSE(is_followed(record, kC)) << "the pose is known better from the positions";
+}
+
 TEST(MachineReplica, AGapStaysAGapUntilTheDriveHasForgotten) {
   const RecordedRun& run = reversals();
   Record record = run.record;
