@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -88,8 +89,19 @@ int compare_models(const DiagnoseOptions& options, const Record& record, const M
   return stop_requested() ? kExitInterrupted : kExitOk;
 }
 
-std::vector<Candidate> candidates_of(const DiagnoseOptions& options, const Machine& declared) {
+/// Whether a record of single axes has nothing at all of the axis that a candidate is of. Where the
+/// probe was read, an axis that stands shows, too.
+bool is_of_unrecorded_axis(const Candidate& candidate, const Record& record) {
+  for (const MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::deflection || candidate.place == kAxisNames[s.axis]) return false;
+  return std::find(kAxisNames.begin(), kAxisNames.end(), candidate.place) != kAxisNames.end();
+}
+
+std::vector<Candidate> candidates_of(const DiagnoseOptions& options, const Record& record,
+                                     const Machine& declared) {
   std::vector<Candidate> all = candidates(declared);
+  if (options.suspects.empty())
+    std::erase_if(all, [&](const Candidate& c) { return is_of_unrecorded_axis(c, record); });
   for (const std::string& effect : options.without)
     if (std::erase_if(all, [&](const Candidate& c) { return c.effect == effect; }) == 0)
       throw InputError("--without: \"" + effect +
@@ -108,7 +120,7 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
     progress.show(fmt::format("{} {:.0f} %", p.doing, p.share * 100));
     return !stop_requested();
   };
-  const DiagnosisCase of{record, replica, declared, candidates_of(options, declared)};
+  const DiagnosisCase of{record, replica, declared, candidates_of(options, record, declared)};
   if (!options.reference.empty()) progress.show("fitting the reference run");
   const std::optional<HealthyRun> healthy = reference_run(options, declared);
   DiagnosisOptions asked;
