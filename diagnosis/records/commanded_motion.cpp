@@ -6,10 +6,10 @@
 namespace vcnc {
 namespace {
 
-constexpr double kSettling = 50e-3;      // [s] after a gap, until the drive has forgotten it
-constexpr double kStarting = 0.3;        // [s] after a begin in motion, the same
-constexpr double kFollowedReach = 3e-3;  // [s] to either side of a sample of what is followed
-constexpr double kStandingStart = 1e-4;  // [m/s or rad/s] below which a record begins at rest
+constexpr double kSettling = 50e-3;       // [s] after a gap, until the drive has forgotten it
+constexpr double kStarting = 0.3;         // [s] after a begin in motion, the same
+constexpr double kFollowedReach = 12e-3;  // [s] to either side of a sample of what is followed
+constexpr double kStandingStart = 1e-4;   // [m/s or rad/s] below which a record begins at rest
 
 /// Fills what is missing by straight lines, constant beyond the ends; tells where.
 std::vector<double> bridged(const std::vector<double>& value, std::vector<char>& known,
@@ -51,6 +51,38 @@ std::vector<double> by_cubics(const std::vector<double>& value, std::size_t half
     result[i] = 3 * sum / ((2 * m - 1) * (2 * m + 1) * (2 * m + 3));
   }
   return result;
+}
+
+/// Noise of a sample, by the median size of third differences.
+double noise_of(const std::vector<double>& value) {
+  std::vector<double> third;
+  for (std::size_t k = 3; k < value.size(); ++k)
+    third.push_back(std::abs(value[k] - 3 * value[k - 1] + 3 * value[k - 2] - value[k - 3]));
+  if (third.empty()) return 0;
+  const auto middle = third.begin() + static_cast<std::ptrdiff_t>(third.size() / 2);
+  std::nth_element(third.begin(), middle, third.end());
+  return 1.4826 * *middle / std::sqrt(20.0);
+}
+
+/// Where an axis was measured, so smooth that the noise of its acceleration is a hundredth of it: a
+/// cubic by least squares over N samples has 26.8 sigma / (h^2 N^2.5) of it.
+std::vector<double> smooth_path(const std::vector<double>& measured, double h) {
+  constexpr double kNoisePart = 0.01;
+  const auto pass = [&](std::vector<double> x, std::size_t half) {
+    for (int i = 0; i < 3; ++i) x = by_cubics(x, half);
+    return x;
+  };
+  const auto most = static_cast<std::size_t>(std::round(kFollowedReach / h));
+  const std::vector<double> smoothest = pass(measured, most);
+  double square = 0;
+  for (std::size_t k = 2; k < smoothest.size(); ++k)
+    square += std::pow(smoothest[k] - 2 * smoothest[k - 1] + smoothest[k - 2], 2);
+  const double difference = std::sqrt(square / static_cast<double>(smoothest.size()));
+  if (!(difference > 0)) return smoothest;
+  const double needed = 1.3 * std::pow(26.8 * noise_of(measured) / (kNoisePart * difference), 0.4);
+  const double half = std::ceil((needed - 1) / 2);
+  if (half >= static_cast<double>(most)) return smoothest;
+  return pass(measured, static_cast<std::size_t>(std::max(2.0, half)));
 }
 
 void round_to(std::vector<double>& value, double step) {
@@ -113,9 +145,7 @@ CommandedMotion commanded_motion(const Record& record) {
     }
     motion.position[axis] = bridged(signal->value, motion.known, settling);
     if (motion.followed[axis])
-      motion.position[axis] =
-          by_cubics(motion.position[axis],
-                    static_cast<std::size_t>(std::round(kFollowedReach / record.period)));
+      motion.position[axis] = smooth_path(motion.position[axis], record.period);
     motion.velocity[axis] = spline_derivative(motion.position[axis], record.period);
     motion.force[axis] = forces(record, axis, motion.known, settling);
     if (motion.told[axis] != CommandedMotion::Told::command) continue;

@@ -7,10 +7,12 @@
 // de Boor, A Practical Guide to Splines, 1978, ch. IV.
 //
 // An axis without a command, but with a position and a twist or a force, is *followed*: its drive
-// is told to go where it was measured, smoothed by a cubic over 3 ms to either side (the
-// acceleration is kept, what is faster than some 150 Hz is lost). Source: Savitzky and Golay,
-// Analytical Chemistry 36 (1964) 1627. Where there are readings of a probe, no axis is followed:
-// the pose is known better from the positions themselves.
+// is told to go where it was measured. What is noise there would be force of the prediction, which
+// a smaller inertia makes less of; so the path is smoothed by cubics over a few samples to either
+// side, three times, as far as the noise of its acceleration needs it, 12 ms at most (what is
+// faster than some 60 Hz is lost then). Source: Savitzky and Golay, Analytical Chemistry 36 (1964)
+// 1627. Where there are readings of a probe, no axis is followed: the pose is known better from the
+// positions themselves.
 #pragma once
 
 #include <vector>

@@ -5,6 +5,7 @@
 #include <future>
 
 #include "diagnosis/records/commanded_motion.hpp"
+#include "model/probe/noise.hpp"
 #include "tests/diagnosis/recorded_run.hpp"
 
 namespace vcnc::replica_test {
@@ -360,6 +361,11 @@ TEST(MachineReplica, AnAxisWithoutCommandThatHasForceAndTwistIsFollowed) {
   Machine without_friction = declared;
   without_friction.effects.axis[kC].get<Coulomb>() = {};
   EXPECT_GT(rms_off(replica.predict(without_friction), 0), 0.1);
+  // Noise of the encoder does not become force.
+  Record noisy = record;
+  for (std::size_t k = 0; k < any.size(); ++k)
+    noisy.signals[0].value[k] += 1e-5 * gaussian_noise(1, 2, k)[0];
+  EXPECT_LT(rms_off(MachineReplica(noisy, declared, std::nullopt).predict(declared), 0), 0.05);
   record.signals.push_back({SignalKind::deflection, 0, "", any, 0});
   EXPECT_FALSE(is_followed(record, kC)) << "the pose is known better from the positions";
 }
