@@ -139,15 +139,11 @@ class ChannelFit {
   /// Sectors of 30 deg, about the middle of the signals, that hold samples; -1: the signals do not
   /// keep to a circle.
   int sectors() const {
-    double u_low = HUGE_VAL, u_high = -HUGE_VAL, w_low = HUGE_VAL, w_high = -HUGE_VAL;
-    for (const auto& [s, block] : samples_) {
-      u_low = std::min(u_low, s.u), u_high = std::max(u_high, s.u);
-      w_low = std::min(w_low, s.w), w_high = std::max(w_high, s.w);
-    }
+    const Extent all = extent();
     std::array<bool, 12> seen{};
     double sum = 0, square = 0;
     for (const auto& [s, block] : samples_) {
-      const double u = s.u - (u_low + u_high) / 2, w = s.w - (w_low + w_high) / 2;
+      const double u = s.u - all.middle.u, w = s.w - all.middle.w;
       const double phi = std::atan2(w, u);
       seen[static_cast<std::size_t>(std::clamp((phi + kPi) / kPi * 6, 0.0, 11.0))] = true;
       sum += std::hypot(u, w);
@@ -161,13 +157,8 @@ class ChannelFit {
 
   /// How far the middle of the signals is off zero, over their amplitude.
   double off_centre() const {
-    double u_low = HUGE_VAL, u_high = -HUGE_VAL, w_low = HUGE_VAL, w_high = -HUGE_VAL;
-    for (const auto& [s, block] : samples_) {
-      u_low = std::min(u_low, s.u), u_high = std::max(u_high, s.u);
-      w_low = std::min(w_low, s.w), w_high = std::max(w_high, s.w);
-    }
-    const double amplitude = std::max(u_high - u_low, w_high - w_low) / 2;
-    return std::max(std::abs(u_low + u_high), std::abs(w_low + w_high)) / 2 / amplitude;
+    const Extent all = extent();
+    return std::max(std::abs(all.middle.u), std::abs(all.middle.w)) / all.amplitude;
   }
 
   /// Which blocks count: those that are fitted (even), held out (odd), or all.
@@ -290,6 +281,20 @@ class ChannelFit {
   }
 
  private:
+  struct Extent {
+    SinCos middle;
+    double amplitude = 0;  ///< half of the larger swing
+  };
+  Extent extent() const {
+    double u_low = HUGE_VAL, u_high = -HUGE_VAL, w_low = HUGE_VAL, w_high = -HUGE_VAL;
+    for (const auto& [s, block] : samples_) {
+      u_low = std::min(u_low, s.u), u_high = std::max(u_high, s.u);
+      w_low = std::min(w_low, s.w), w_high = std::max(w_high, s.w);
+    }
+    return {{(u_low + u_high) / 2, (w_low + w_high) / 2},
+            std::max(u_high - u_low, w_high - w_low) / 2};
+  }
+
   /// A few samples far off the circle of all others.
   void leave_out_outliers() {
     if (samples_.empty()) return;
@@ -540,16 +545,15 @@ Diagnosis diagnose_quadrature(const Record& record, const Machine& declared) {
     if (sectors < 0) {
       d.warnings.push_back(
           fmt::format("channel {}: sine and cosine do not draw a circle (noise at rest, less than "
-                      "a period, the "
-                      "same signal twice, or signals that are none of an encoder)",
+                      "a period, the same signal twice, or signals that are none of an encoder)",
                       name));
       continue;
     }
     if (sectors < 12) {
       d.warnings.push_back(fmt::format(
           "channel {}: the samples lie in {} of 12 sectors of the signals' period only; the "
-          "encoder "
-          "must move by a period and more, at changing speed where few samples fall in a period",
+          "encoder must move by a period and more, at changing speed where few samples fall in a "
+          "period",
           name, sectors));
       continue;
     }
