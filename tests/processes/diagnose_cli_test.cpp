@@ -83,6 +83,27 @@ TEST_F(DiagnoseCli, TheTableItselfWithItsMapGivesTheSameVerdict) {
   EXPECT_EQ(said.out.find("NO DEVIATION: "), 0u) << said.out;
 }
 
+/// A record of one axis is not told what other axes cannot show.
+TEST_F(DiagnoseCli, OnlyAxesOfTheRecordAreCandidates) {
+  std::string text = "t,told,is\n";
+  for (int k = 0; k < 4000; ++k) {
+    const double x = 10 * (1 - std::cos(kPi2 * k / 1000));
+    text += fmt::format("{},{:.7f},{:.7f}\n", k, x, x + 1e-5 * std::sin(12.9898 * k * k));
+  }
+  write_text(scratch_ / "axis.csv", text);
+  write_text(scratch_ / "axis.toml",
+             "machine = \"machine.toml\"\n[time]\ncolumn = \"t\"\nunit = \"ms\"\n"
+             "[[signals]]\ncolumn = \"told\"\nkind = \"command\"\naxis = \"X\"\nunit = \"mm\"\n"
+             "[[signals]]\ncolumn = \"is\"\nkind = \"position\"\naxis = \"X\"\nunit = \"mm\"\n");
+  const Said said = vcnc("diagnose " + (scratch_ / "axis.csv") + " --map " +
+                         (scratch_ / "axis.toml") + " --out " + (scratch_ / "axis"));
+  ASSERT_EQ(said.code, 0) << said.err;
+  EXPECT_EQ(said.out.find("NO DEVIATION: "), 0u) << said.out;
+  const std::string json = read_text(scratch_ / "axis/diagnosis.json");
+  EXPECT_NE(json.find("\"X.coulomb\""), std::string::npos);
+  EXPECT_EQ(json.find("\"Y.coulomb\""), std::string::npos);
+}
+
 TEST_F(DiagnoseCli, RefusesWhatItCannotUseAndLeavesNothingBehind) {
   const std::string table = scratch_ / "bad.csv", map = scratch_ / "map.toml";
   expect_refused("diagnose " + table, "a table needs --map");
