@@ -7,8 +7,8 @@
 
 #include "analysis/compare_page.hpp"
 #include "analysis/session.hpp"
-#include "scratch.hpp"
 #include "synthetic.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc::compare_test {
 namespace {

@@ -15,7 +15,7 @@
 #include <random>
 #include <sstream>
 
-#include "scratch.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc::recording_test {
 namespace {
@@ -215,7 +215,7 @@ TEST(Recording, RefusesWhatIsNotARecording) {
 TEST(Recording, CannotBeCreatedInAMissingFolder) {
   const Scratch dir;
   try {
-    RecordingWriter writer(dir / "none" / "recording.h5", kBegin);
+    RecordingWriter writer(dir / "none/recording.h5", kBegin);
     FAIL() << "no exception";
   } catch (const RecordingError& e) {
     EXPECT_NE(std::string(e.what()).find("cannot be created"), std::string::npos) << e.what();

@@ -9,8 +9,8 @@
 #include "analysis/curves.hpp"
 #include "analysis/plot.hpp"
 #include "analysis/session.hpp"
-#include "scratch.hpp"
 #include "synthetic.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc::report_test {
 namespace {

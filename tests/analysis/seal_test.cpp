@@ -7,7 +7,7 @@
 #include <iterator>
 
 #include "analysis/recording.hpp"
-#include "scratch.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc::seal_test {
 namespace {

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "scratch.hpp"
 #include "synthetic.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc::session_test {
 namespace {
@@ -123,7 +123,7 @@ TEST(AnalysisSession, TextNamesVerdictAndFigures) {
 TEST(AnalysisSession, UnusableFolderIsOneClearError) {
   const Scratch dir;
   std::ofstream(dir / "file") << "x";
-  EXPECT_THROW(AnalysisSession({dir / "file" / "run", false, false}), std::runtime_error);
+  EXPECT_THROW(AnalysisSession({dir / "file/run", false, false}), std::runtime_error);
 }
 
 }  // namespace

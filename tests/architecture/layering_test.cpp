@@ -29,10 +29,10 @@ const std::vector<std::string> kFolders{"model",      "configs",   "bus",
                                         "controller", "servo_sim", "probe_sim",
                                         "analysis",   "diagnosis", "apps"};
 
-std::vector<Source> sources() {
+std::vector<Source> sources(const std::vector<std::string>& folders = kFolders) {
   std::vector<Source> all;
   const fs::path root(VCNC_SOURCE_DIR);
-  for (const std::string& folder : kFolders) {
+  for (const std::string& folder : folders) {
     for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
       const std::string extension = entry.path().extension();
       if (extension != ".cpp" && extension != ".hpp") continue;
@@ -158,6 +158,20 @@ TEST(Layering, EveryTypeInAHeaderHasANameOfItsOwn) {
     }
   }
   EXPECT_GT(owner.size(), 80u);
+}
+
+/// Tests run side by side: a file with a name of one's own choosing is another test's, too.
+TEST(Tests, TakeTheirFilesFromScratch) {
+  static const std::regex own(R"re(temp_directory_path|mkdtemp|tmpnam|TempDir\(|"/tmp)re");
+  std::size_t checked = 0;
+  for (const Source& source : sources({"tests"})) {
+    if (source.path == "tests/scratch.hpp" || source.path.starts_with("tests/architecture/") ||
+        source.path.starts_with("tests/bench/") || source.path.starts_with("tests/fuzz/"))
+      continue;
+    ++checked;
+    EXPECT_FALSE(std::regex_search(source.text, own)) << source.path;
+  }
+  EXPECT_GT(checked, 100u);
 }
 
 TEST(Layering, MainsAreShort) {

@@ -7,6 +7,7 @@
 #include "bus/inproc.hpp"
 #include "bus/main_loop.hpp"
 #include "bus/run_node.hpp"
+#include "tests/scratch.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc::degraded_test {
@@ -147,8 +148,8 @@ struct Orphan {
 /// falls silent.
 enum class End { closed, stopped, silent };
 Orphan orphan(End end) {
-  toy::SocketDir dir;
-  Hub hub(dir.file("bus"));
+  Scratch dir;
+  Hub hub(dir / "bus");
   Orphan result;
   auto master = open_transport(hub.uri(), 0);
   std::thread thread([&] {

@@ -13,6 +13,7 @@
 #include "bus/inproc.hpp"
 #include "bus/main_loop.hpp"
 #include "bus/run_node.hpp"
+#include "tests/scratch.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc::fault_test {
@@ -302,8 +303,8 @@ TEST(Faults, GiveOneHashInOneProcessAndOverTheHub) {
   const auto check = [](const BusFaults& faults, const std::string& what) {
     const MainLoopResult expected = play_in_one_process(faults);
     ASSERT_TRUE(expected.complete) << what << expected.failure;
-    toy::SocketDir dir;
-    Hub hub(dir.file("bus"));
+    Scratch dir;
+    Hub hub(dir / "bus");
     std::vector<std::thread> threads;
     for (int id = kNodes; id >= 1; --id)
       threads.emplace_back([&, id] {

@@ -17,6 +17,7 @@
 #include "bus/main_loop.hpp"
 #include "bus/node_shell.hpp"
 #include "bus/run_node.hpp"
+#include "tests/scratch.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc::hub_test {
@@ -63,9 +64,9 @@ void delay_randomly(toy::ToyNode& node, std::uint64_t seed) {
 
 TEST(Hub, ThreadsInAnyOrderWithDelaysGiveTheHashOfOneProcess) {
   const std::string expected = inproc_hash();
-  toy::SocketDir dir;
+  Scratch dir;
   for (std::uint64_t seed = 0; seed < 3; ++seed) {
-    Hub hub(dir.file("bus"));
+    Hub hub(dir / "bus");
     std::vector<std::thread> threads;
     std::atomic<int> stopped = 0;
     for (const int id : permuted(seed))
@@ -106,14 +107,14 @@ toy::ChildProcess node_process(const std::string& uri, int id, std::uint64_t del
 
 TEST(Hub, ProcessesInAnyOrderWithDelaysGiveTheHashOfOneProcess) {
   const std::string expected = inproc_hash();
-  toy::SocketDir dir;
+  Scratch dir;
   for (std::uint64_t seed = 1; seed < 4; ++seed) {
     // Forked before the hub's thread exists: a child of a threaded process may only exec.
     std::vector<toy::ChildProcess> children;
     for (const int id : permuted(seed))
-      children.push_back(node_process("hub://" + dir.file("bus"), id,
+      children.push_back(node_process("hub://" + dir / "bus", id,
                                       seed == 1 ? 0 : seed * 10 + static_cast<std::uint64_t>(id)));
-    Hub hub(dir.file("bus"));
+    Hub hub(dir / "bus");
     const auto result = run_master(hub.uri(), kCycles, seed == 3 ? 4.0 : 0.0);
     ASSERT_TRUE(result.complete) << result.failure;
     EXPECT_EQ(result.trace_hash, expected);
@@ -122,13 +123,13 @@ TEST(Hub, ProcessesInAnyOrderWithDelaysGiveTheHashOfOneProcess) {
 }
 
 TEST(Hub, KilledNodeIsNamed) {
-  toy::SocketDir dir;
+  Scratch dir;
   std::vector<toy::ChildProcess> children;
   for (int id = 1; id <= kNodes; ++id)
     children.push_back(toy::ChildProcess([&dir, id] {
       for (int attempt = 0; attempt < 200; ++attempt) {
         try {
-          const auto bus = open_transport("hub://" + dir.file("bus"), id);
+          const auto bus = open_transport("hub://" + dir / "bus", id);
           toy::ToyNode node(id);
           node.before_step = [id](Tick k) {
             if (id == 4 && k == 100) ::raise(SIGKILL);
@@ -140,7 +141,7 @@ TEST(Hub, KilledNodeIsNamed) {
       }
       return 2;
     }));
-  Hub hub(dir.file("bus"));
+  Hub hub(dir / "bus");
   const auto result = run_master(hub.uri(), 100000);
   EXPECT_FALSE(result.complete);
   EXPECT_EQ(result.failure, "toy 4 left the bus in cycle 100");
@@ -149,8 +150,8 @@ TEST(Hub, KilledNodeIsNamed) {
 }
 
 TEST(Hub, SilentNodeTimesOutByName) {
-  toy::SocketDir dir;
-  Hub hub(dir.file("bus"));
+  Scratch dir;
+  Hub hub(dir / "bus");
   std::vector<std::thread> threads;
   for (int id = 1; id <= kNodes; ++id)
     threads.emplace_back([&hub, id] {
@@ -178,8 +179,8 @@ TEST(Hub, SilentNodeTimesOutByName) {
 TEST(Hub, TapThatNeverReadsDoesNotStallTheMachine) {
   const Tick cycles = 3000;
   const std::string expected = inproc_hash(cycles);
-  toy::SocketDir dir;
-  Hub hub(dir.file("bus"));
+  Scratch dir;
+  Hub hub(dir / "bus");
   HubTransport sleeper(hub.uri().substr(6), kTapId);
   std::atomic<std::size_t> seen = 0;
   std::atomic<std::uint64_t> tap_lost = 0;  // on a busy host even a tap that reads may be too slow
@@ -228,9 +229,9 @@ TEST(Hub, TapThatNeverReadsDoesNotStallTheMachine) {
 }
 
 TEST(Hub, MastersCommandsTravelWithItsNextSync) {
-  toy::SocketDir dir;
-  Hub hub(dir.file("bus"));
-  HubTransport node(dir.file("bus"), 1), master(dir.file("bus"), 0);
+  Scratch dir;
+  Hub hub(dir / "bus");
+  HubTransport node(dir / "bus", 1), master(dir / "bus", 0);
   const Frame command = encode(GroupCommand{}), sync = encode(Sync{1});
   master.send({&command, 1});
   Frames frames;
@@ -241,9 +242,9 @@ TEST(Hub, MastersCommandsTravelWithItsNextSync) {
 }
 
 TEST(Hub, AnswersReachTheOtherNodesWithTheNextSync) {
-  toy::SocketDir dir;
-  Hub hub(dir.file("bus"));
-  HubTransport a(dir.file("bus"), 1), b(dir.file("bus"), 2), master(dir.file("bus"), 0);
+  Scratch dir;
+  Hub hub(dir / "bus");
+  HubTransport a(dir / "bus", 1), b(dir / "bus", 2), master(dir / "bus", 0);
   const Frame sync = encode(Sync{1}), from_a = encode(DriveStatus{.node = 1}),
               from_b = encode(DriveStatus{.node = 2});
   Frames frames;
@@ -266,9 +267,9 @@ TEST(Hub, AnswersReachTheOtherNodesWithTheNextSync) {
 }
 
 TEST(Hub, TapSeesEverything) {
-  toy::SocketDir dir;
-  Hub hub(dir.file("bus"));
-  HubTransport tap(dir.file("bus"), kTapId), node(dir.file("bus"), 1), master(dir.file("bus"), 0);
+  Scratch dir;
+  Hub hub(dir / "bus");
+  HubTransport tap(dir / "bus", kTapId), node(dir / "bus", 1), master(dir / "bus", 0);
   for (int i = 0; i < 100; ++i) {
     const Frame sync = encode(Sync{static_cast<std::uint8_t>(i + 1)}),
                 answer = encode(DriveStatus{.node = 1});
@@ -284,9 +285,9 @@ TEST(Hub, TapSeesEverything) {
 }
 
 TEST(Hub, LossOfASlowTapIsCountedExactly) {
-  toy::SocketDir dir;
-  Hub hub(dir.file("bus"));
-  HubTransport tap(dir.file("bus"), kTapId), master(dir.file("bus"), 0);
+  Scratch dir;
+  Hub hub(dir / "bus");
+  HubTransport tap(dir / "bus", kTapId), master(dir / "bus", 0);
   constexpr std::uint64_t kSent = 2000;
   Frames seen;
   const Frame sync = encode(Sync{1});
@@ -301,10 +302,10 @@ TEST(Hub, LossOfASlowTapIsCountedExactly) {
 }
 
 TEST(Hub, EndOfTheMasterClosesTheNodes) {
-  toy::SocketDir dir;
-  Hub hub(dir.file("bus"));
-  HubTransport node(dir.file("bus"), 1);
-  auto master = std::make_unique<HubTransport>(dir.file("bus"), 0);
+  Scratch dir;
+  Hub hub(dir / "bus");
+  HubTransport node(dir / "bus", 1);
+  auto master = std::make_unique<HubTransport>(dir / "bus", 0);
   const Frame nmt = encode(Nmt{NmtCommand::stop, 0});
   master->send({&nmt, 1});
   master.reset();
@@ -317,7 +318,7 @@ TEST(Hub, EndOfTheMasterClosesTheNodes) {
 }
 
 TEST(Hub, ErrorsAreClear) {
-  toy::SocketDir dir;
+  Scratch dir;
   const auto message = [](const auto& action) -> std::string {
     try {
       action();
@@ -326,27 +327,26 @@ TEST(Hub, ErrorsAreClear) {
     }
     return "no error";
   };
-  EXPECT_NE(message([&] { HubTransport(dir.file("bus"), 1); }).find("is the machine running?"),
+  EXPECT_NE(message([&] { HubTransport(dir / "bus", 1); }).find("is the machine running?"),
             std::string::npos);
   EXPECT_NE(message([&] { Hub("/nowhere/at/all"); }).find("No such file"), std::string::npos);
   EXPECT_NE(message([&] { Hub(std::string(300, 'x')); }).find("1 to 107 characters"),
             std::string::npos);
-  Hub hub(dir.file("bus"));
-  EXPECT_NE(message([&] { Hub(dir.file("bus")); }).find("in use"), std::string::npos);
-  HubTransport first(dir.file("bus"), 3);
-  EXPECT_NE(
-      message([&] { HubTransport(dir.file("bus"), 3); }).find("node id 3 is already on the bus"),
-      std::string::npos);
-  EXPECT_NE(message([&] { HubTransport(dir.file("bus"), 200); }).find("0..127 and 255"),
+  Hub hub(dir / "bus");
+  EXPECT_NE(message([&] { Hub(dir / "bus"); }).find("in use"), std::string::npos);
+  HubTransport first(dir / "bus", 3);
+  EXPECT_NE(message([&] { HubTransport(dir / "bus", 3); }).find("node id 3 is already on the bus"),
             std::string::npos);
-  HubTransport tap(dir.file("bus"), kTapId), second_tap(dir.file("bus"), kTapId);
+  EXPECT_NE(message([&] { HubTransport(dir / "bus", 200); }).find("0..127 and 255"),
+            std::string::npos);
+  HubTransport tap(dir / "bus", kTapId), second_tap(dir / "bus", kTapId);
   EXPECT_NE(message([&] { tap.send({}); }).find("cannot send"), std::string::npos);
 }
 
 /// A process that is stopped while it waits for its welcome hears it when it goes on.
 TEST(Hub, AClientStoppedBeforeItsWelcomeIsWelcome) {
-  toy::SocketDir dir;
-  const std::string path = dir.file("bus");
+  Scratch dir;
+  const std::string path = dir / "bus";
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   std::strcpy(address.sun_path, path.c_str());
@@ -383,8 +383,8 @@ TEST(Hub, AClientStoppedBeforeItsWelcomeIsWelcome) {
 }
 
 TEST(Hub, FileOfAKilledHubIsReplaced) {
-  toy::SocketDir dir;
-  const std::string path = dir.file("bus");
+  Scratch dir;
+  const std::string path = dir / "bus";
   {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
@@ -406,14 +406,14 @@ TEST(Hub, FileOfAKilledHubIsReplaced) {
 }
 
 TEST(Hub, NonsenseFromAClientEndsThatClientOnly) {
-  toy::SocketDir dir;
-  Hub hub(dir.file("bus"));
-  HubTransport node(dir.file("bus"), 1), master(dir.file("bus"), 0);
+  Scratch dir;
+  Hub hub(dir / "bus");
+  HubTransport node(dir / "bus", 1), master(dir / "bus", 0);
   toy::Random random(8);
   for (int i = 0; i < 200; ++i) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
-    std::strcpy(address.sun_path, dir.file("bus").c_str());
+    std::strcpy(address.sun_path, (dir / "bus").c_str());
     const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET, 0);
     ASSERT_EQ(::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
     if (i % 2 == 0) {

@@ -130,23 +130,6 @@ class Random {
   std::uint64_t state_;
 };
 
-/// A directory for sockets that vanishes with this object.
-class SocketDir {
- public:
-  SocketDir() {
-    const char* base = ::getenv("TMPDIR");
-    path_ = std::string(base != nullptr ? base : "/tmp") + "/vcnc_bus.XXXXXX";
-    if (::mkdtemp(path_.data()) == nullptr) std::abort();
-  }
-  ~SocketDir() { ::rmdir(path_.c_str()); }
-  SocketDir(const SocketDir&) = delete;
-  SocketDir& operator=(const SocketDir&) = delete;
-  std::string file(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
-
 /// Runs `body` in a child process, which ends with the code that it returns.
 class ChildProcess {
  public:

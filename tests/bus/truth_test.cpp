@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/scratch.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc::truth_test {
@@ -45,8 +46,8 @@ class Truth : public ::testing::TestWithParam<bool> {
   Channel open() {
     Channel channel;
     if (GetParam()) {
-      channel.probe = open_truth_reader(dir_.file("truth"));
-      channel.drive_owner = open_truth_writer(dir_.file("truth"));
+      channel.probe = open_truth_reader(dir_ / "truth");
+      channel.drive_owner = open_truth_writer(dir_ / "truth");
       channel.drive = channel.drive_owner.get();
     } else {
       channel.probe = open_local_truth();
@@ -54,7 +55,7 @@ class Truth : public ::testing::TestWithParam<bool> {
     }
     return channel;
   }
-  toy::SocketDir dir_;
+  Scratch dir_;
 };
 
 TEST_P(Truth, CycleIsThereInTheNextOneWhoeverRunsFirst) {
@@ -90,16 +91,16 @@ INSTANTIATE_TEST_SUITE_P(Kinds, Truth, ::testing::Bool(),
                          [](const auto& kind) { return kind.param ? "Socket" : "Local"; });
 
 TEST(TruthSocket, AbsentReaderDoesNotHoldADrive) {
-  toy::SocketDir dir;
-  auto drive = open_truth_writer(dir.file("truth"));
+  Scratch dir;
+  auto drive = open_truth_writer(dir / "truth");
   for (Tick k = 0; k < 100; ++k) drive->publish(0, cycle(k, 0));
   EXPECT_EQ(drive->dropped(), 100u);
 }
 
 TEST(TruthSocket, BlockedReaderDoesNotHoldADriveAndEveryLossIsCounted) {
-  toy::SocketDir dir;
-  auto probe = open_truth_reader(dir.file("truth"));
-  auto drive = open_truth_writer(dir.file("truth"));
+  Scratch dir;
+  auto probe = open_truth_reader(dir / "truth");
+  auto drive = open_truth_writer(dir / "truth");
   for (Tick k = 0; k < 2000; ++k) publish_all(*drive, k);
   EXPECT_GT(drive->dropped(), 0u);
   EXPECT_LE(drive->dropped(), 5u * 2000 - 10);  // two cycles always fit
@@ -110,11 +111,11 @@ TEST(TruthSocket, BlockedReaderDoesNotHoldADriveAndEveryLossIsCounted) {
 }
 
 TEST(TruthSocket, WrongDatagramsAreCountedAndIgnored) {
-  toy::SocketDir dir;
-  auto probe = open_truth_reader(dir.file("truth"));
+  Scratch dir;
+  auto probe = open_truth_reader(dir / "truth");
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  std::strcpy(address.sun_path, dir.file("truth").c_str());
+  std::strcpy(address.sun_path, (dir / "truth").c_str());
   const int fd = ::socket(AF_UNIX, SOCK_DGRAM, 0);
   ASSERT_EQ(::sendto(fd, "hello", 5, 0, reinterpret_cast<sockaddr*>(&address), sizeof address), 5);
   ::close(fd);
@@ -124,8 +125,8 @@ TEST(TruthSocket, WrongDatagramsAreCountedAndIgnored) {
 }
 
 TEST(TruthSocket, StaleFileOfAKilledRunIsReplacedAndTheFileIsRemovedAtTheEnd) {
-  toy::SocketDir dir;
-  const std::string path = dir.file("truth");
+  Scratch dir;
+  const std::string path = dir / "truth";
   std::ofstream(path) << "left over";
   {
     auto probe = open_truth_reader(path);

@@ -1,11 +1,12 @@
 #include "configs/config.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 #include <functional>
+
+#include "tests/scratch.hpp"
 
 namespace vcnc::config_test {
 namespace {
@@ -240,29 +241,10 @@ TEST(Config, PathsAreRelativeToTheirSource) {
   EXPECT_EQ(from_here.setup.piece, (std::filesystem::current_path() / "ring.toml").string());
 }
 
-/// A folder with a machine file and what stands beside it, gone after the test.
-class Workshop {
- public:
-  Workshop()
-      : folder_(std::filesystem::temp_directory_path() /
-                ("vcnc-config-test-" + std::to_string(::getpid()))) {
-    std::filesystem::create_directory(folder_);
-  }
-  ~Workshop() { std::filesystem::remove_all(folder_); }
-  std::string write(const std::string& name, const std::string& text) const {
-    const std::string path = (folder_ / name).string();
-    std::ofstream(path) << text;
-    return path;
-  }
-
- private:
-  std::filesystem::path folder_;
-};
-
 constexpr const char* kOwnFile = "[[nc.compensation.table]]\naxis = \"X\"\nfile = \"x.txt\"\n";
 
 TEST(CompensationFile, HoldsMeasuredPositionsOrTrims) {
-  const Workshop workshop;
+  const Scratch workshop;
   const std::string machine = workshop.write("m.toml", kOwnFile);
   workshop.write("x.txt", "# LinuxCNC\n-100 -99.998 -100.001\n\n0, 0.004, 0.001\n+100 100 100\n");
   const CompensationTable actual = load_machine(machine).nc.compensation.tables.at(0);
@@ -284,7 +266,7 @@ TEST(CompensationFile, HoldsMeasuredPositionsOrTrims) {
 }
 
 TEST(CompensationFile, EveryMistakeIsOneSentenceWithItsLine) {
-  const Workshop workshop;
+  const Scratch workshop;
   const std::string machine = workshop.write("m.toml", kOwnFile);
   const auto says = [&](const std::string& points) {
     const std::string file = workshop.write("x.txt", points);

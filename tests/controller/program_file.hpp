@@ -1,36 +1,18 @@
 // A program text as a file, and helpers to read it.
 #pragma once
 
-#include <unistd.h>
-
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
 #include "controller/gcode/interpreter.hpp"
 #include "controller/player.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc {
 
-/// Exists as long as the object does.
-class ProgramFile {
+class ProgramFile : public TemporaryFile {
  public:
-  explicit ProgramFile(const std::string& text) {
-    static int count = 0;
-    const std::string name =
-        "program_" + std::to_string(getpid()) + "_" + std::to_string(count++) + ".nc";
-    path_ = (std::filesystem::temp_directory_path() / name).string();
-    std::ofstream(path_, std::ios::binary) << text;
-  }
-  ~ProgramFile() { std::remove(path_.c_str()); }
-  ProgramFile(const ProgramFile&) = delete;
-  ProgramFile& operator=(const ProgramFile&) = delete;
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
+  explicit ProgramFile(const std::string& text) : TemporaryFile("program.nc", text) {}
 };
 
 /// All blocks before the end.

@@ -3,13 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <map>
 
 #include "configs/config.hpp"
 #include "controller/player.hpp"
 #include "diagnosis/records/stretches.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc::diagnosis_program_test {
 namespace {
@@ -34,11 +33,8 @@ ProgramOptions options() {
 
 /// What the program commands, without running the machine.
 Record commands_of(const std::string& text) {
-  const std::filesystem::path path =
-      std::filesystem::temp_directory_path() / "vcnc-test-diagnosis-program.ngc";
-  std::ofstream(path) << text;
-  Player player(path.string(), machine());
-  std::filesystem::remove(path);
+  const TemporaryFile file("program.ngc", text);
+  Player player(file.path(), machine());
   Record record;
   for (std::size_t i = 0; i < kAxisCount; ++i)
     record.signals.push_back({SignalKind::command, i, std::string(kAxisNames[i]), {}, 0});

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -15,6 +14,7 @@
 #include "diagnosis/records/any_record.hpp"
 #include "diagnosis/records/record_check.hpp"
 #include "diagnosis/records/record_file.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc::import_table_test {
 namespace {
@@ -408,9 +408,7 @@ TEST(Resolution, IsTheStepOfQuantisedValuesAndNothingOfSmoothOnes) {
 
 class RecordFile : public testing::Test {
  protected:
-  RecordFile() { fs::create_directories(folder_); }
-  ~RecordFile() override { fs::remove_all(folder_); }
-  const fs::path folder_ = fs::temp_directory_path() / fmt::format("vcnc-record-{}", getpid());
+  const Scratch folder_;
 };
 
 TEST_F(RecordFile, ReadsBackWhatWasWrittenToTheLastBit) {
@@ -418,10 +416,10 @@ TEST_F(RecordFile, ReadsBackWhatWasWrittenToTheLastBit) {
   record.machine_toml = to_toml(declared());
   record.warnings = {"one", "two"};
   record.signals[1].value[7] = kMissing;
-  const fs::path file = folder_ / "run.h5";
+  const std::string file = folder_ / "run.h5";
   write_record(record, file);
   EXPECT_TRUE(is_record_file(file));
-  const Record back = load_record(file.string());
+  const Record back = load_record(file);
   EXPECT_EQ(back.source, record.source);
   EXPECT_EQ(back.period, record.period);
   EXPECT_EQ(back.machine_toml, record.machine_toml);
@@ -442,9 +440,9 @@ TEST_F(RecordFile, ReadsBackWhatWasWrittenToTheLastBit) {
 
 TEST_F(RecordFile, AnyHdf5FileIsATableOfItsDataSets) {
   const Record record = imported(sound_map());
-  const fs::path file = folder_ / "run.h5";
+  const std::string file = folder_ / "run.h5";
   write_record(record, file);
-  const MeasuredTable table = read_measured_table(file.string());
+  const MeasuredTable table = read_measured_table(file);
   ASSERT_EQ(table.columns.size(), record.signals.size());
   EXPECT_EQ(table.columns[1].name, "signal_1");
   EXPECT_EQ(table.columns[1].value, record.signals[1].value);
@@ -456,7 +454,7 @@ TEST_F(RecordFile, AnyHdf5FileIsATableOfItsDataSets) {
 }
 
 TEST_F(RecordFile, AChangedOrForeignFileIsRefused) {
-  const fs::path file = folder_ / "run.h5";
+  const std::string file = folder_ / "run.h5";
   write_record(imported(sound_map()), file);
   {
     std::fstream bytes(file, std::ios::in | std::ios::out | std::ios::binary);
@@ -464,10 +462,10 @@ TEST_F(RecordFile, AChangedOrForeignFileIsRefused) {
     bytes.put('\x55');
   }
   EXPECT_THROW(read_record(file), MeasurementError);
-  EXPECT_THROW(load_record(file.string()), InputError);
+  EXPECT_THROW(load_record(file), InputError);
   std::ofstream(folder_ / "run.csv") << "t,q\n0,1\n";
   try {
-    load_record((folder_ / "run.csv").string());
+    load_record(folder_ / "run.csv");
     FAIL();
   } catch (const InputError& e) {
     EXPECT_NE(std::string(e.what()).find("a table needs --map"), std::string::npos) << e.what();

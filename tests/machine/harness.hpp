@@ -18,6 +18,7 @@
 #include "configs/config.hpp"
 #include "model/geometry/piece.hpp"
 #include "tests/sanitized.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc {
 
@@ -54,21 +55,6 @@ inline std::unique_ptr<PieceParams> piece_params(const Machine& machine) {
              ? nullptr
              : std::make_unique<PieceParams>(load_piece(machine.setup.piece));
 }
-
-/// A file that is gone when the test is over.
-class TemporaryFile {
- public:
-  TemporaryFile(const std::string& name, const std::string& text)
-      : path_(std::filesystem::temp_directory_path() /
-              ("vcnc-test-" + std::to_string(::getpid()) + "-" + name)) {
-    std::ofstream(path_) << text;
-  }
-  ~TemporaryFile() { std::filesystem::remove(path_); }
-  std::string path() const { return path_.string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 inline Outcome play(const Machine& machine, const std::string& program, std::uint64_t seed = 1) {
   const TemporaryFile file("program.ngc", program);

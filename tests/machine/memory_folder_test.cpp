@@ -9,6 +9,7 @@
 #include "apps/memory_content.hpp"
 #include "model/input_error.hpp"
 #include "servo_sim/spindle_node.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc::memory_folder_test {
 namespace {
@@ -17,13 +18,7 @@ namespace fs = std::filesystem;
 
 class MemoryFolderTest : public testing::Test {
  protected:
-  MemoryFolderTest() {
-    std::string pattern = (fs::temp_directory_path() / "vcnc-memory-XXXXXX").string();
-    base_ = ::mkdtemp(pattern.data());
-  }
-  ~MemoryFolderTest() override { fs::remove_all(base_); }
-
-  std::string path() const { return (base_ / "memory").string(); }
+  std::string path() const { return base_ / "memory"; }
   static void write(const fs::path& file, const std::string& text) {
     std::ofstream(file, std::ios::binary) << text;
   }
@@ -40,7 +35,7 @@ class MemoryFolderTest : public testing::Test {
     return "";
   }
 
-  fs::path base_;
+  const Scratch base_;
 };
 
 TEST_F(MemoryFolderTest, KeepsWhatWasSavedLast) {

@@ -10,23 +10,11 @@
 #include <fstream>
 #include <string>
 
+#include "tests/scratch.hpp"
+
 namespace vcnc {
 
 namespace fs = std::filesystem;
-
-/// A folder that is gone when the test is over.
-class Scratch {
- public:
-  Scratch() {
-    std::string pattern = (fs::temp_directory_path() / "vcnc-test-XXXXXX").string();
-    path_ = ::mkdtemp(pattern.data());
-  }
-  ~Scratch() { fs::remove_all(path_); }
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  fs::path path_;
-};
 
 inline std::string read_text(const std::string& path) {
   std::ifstream in(path, std::ios::binary);

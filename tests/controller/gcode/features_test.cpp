@@ -1,16 +1,14 @@
 // What the words do, against values computed by hand.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <random>
 
 #include "controller/gcode/arc_geometry.hpp"
 #include "controller/gcode/interpreter.hpp"
 #include "controller/program_error.hpp"
 #include "tests/controller/program_file.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc::features_test {
 namespace {
@@ -27,10 +25,9 @@ InterpreterOptions bare() {
   return options;
 }
 
-std::vector<Block> blocks_of(const std::string& text, InterpreterOptions options = bare(),
-                             const Machine& machine = Machine()) {
-  const ProgramFile file(text + "\nM30\n");
-  GcodeInterpreter program(file.path(), machine, std::move(options));
+std::vector<Block> blocks_of_file(const std::string& path, InterpreterOptions options = bare(),
+                                  const Machine& machine = Machine()) {
+  GcodeInterpreter program(path, machine, std::move(options));
   std::vector<Block> blocks;
   for (Block block = program.next(); !std::holds_alternative<ProgramEnd>(block);
        block = program.next())
@@ -38,18 +35,28 @@ std::vector<Block> blocks_of(const std::string& text, InterpreterOptions options
   return blocks;
 }
 
-std::vector<Move> moves_of(const std::string& text, InterpreterOptions options = bare(),
-                           const Machine& machine = Machine()) {
+std::vector<Block> blocks_of(const std::string& text, InterpreterOptions options = bare(),
+                             const Machine& machine = Machine()) {
+  const ProgramFile file(text + "\nM30\n");
+  return blocks_of_file(file.path(), std::move(options), machine);
+}
+
+std::vector<Move> moves_among(const std::vector<Block>& blocks) {
   std::vector<Move> moves;
-  for (const Block& block : blocks_of(text, std::move(options), machine))
+  for (const Block& block : blocks)
     if (const Move* move = std::get_if<Move>(&block)) moves.push_back(*move);
   return moves;
 }
 
+std::vector<Move> moves_of(const std::string& text, InterpreterOptions options = bare(),
+                           const Machine& machine = Machine()) {
+  return moves_among(blocks_of(text, std::move(options), machine));
+}
+
 /// End points [mm] of X, Y, Z of all moves, as text: "r 1 2 3; l 4 5 6; a 7 8 9".
-std::string path_of(const std::string& text, InterpreterOptions options = bare()) {
+std::string path_of(const std::vector<Move>& moves) {
   std::string path;
-  for (const Move& move : moves_of(text, std::move(options))) {
+  for (const Move& move : moves) {
     path += path.empty() ? "" : "; ";
     path += move.probe != Move::Probe::none  ? "p"
             : move.kind == Move::Kind::rapid ? "r"
@@ -63,6 +70,10 @@ std::string path_of(const std::string& text, InterpreterOptions options = bare()
     }
   }
   return path;
+}
+
+std::string path_of(const std::string& text, InterpreterOptions options = bare()) {
+  return path_of(moves_of(text, std::move(options)));
 }
 
 std::string refused(const std::string& text, InterpreterOptions options = bare()) {
@@ -306,13 +317,11 @@ TEST(GcodeFlow, FanucMacros) {
 }
 
 TEST(GcodeFlow, SubroutinesInFilesBesideTheProgram) {
-  const std::filesystem::path beside = std::filesystem::temp_directory_path() / "beside.ngc",
-                              numbered = std::filesystem::temp_directory_path() / "8123.nc";
-  std::ofstream(beside) << "O<beside> sub\nG0 X#1\nO<beside> endsub\n";
-  std::ofstream(numbered) << "%\nO8123\nG0 Y2\nM99\n";
-  EXPECT_EQ(path_of("O<beside> call [4]\nM98 P8123"), "r 4 0 0; r 4 2 0");
-  std::filesystem::remove(beside);
-  std::filesystem::remove(numbered);
+  const Scratch folder;
+  folder.write("beside.ngc", "O<beside> sub\nG0 X#1\nO<beside> endsub\n");
+  folder.write("8123.nc", "%\nO8123\nG0 Y2\nM99\n");
+  const std::string program = folder.write("program.nc", "O<beside> call [4]\nM98 P8123\nM30\n");
+  EXPECT_EQ(path_of(moves_among(blocks_of_file(program))), "r 4 0 0; r 4 2 0");
   EXPECT_NE(refused("O<beside> call").find("there is no O<beside> sub"), std::string::npos);
 }
 
@@ -466,12 +475,8 @@ TEST(GcodeTools, HaveOffsetsOfTheRotaryAxes) {
   EXPECT_NEAR(moves[0].end[kC], -8 * kDegree, 1e-15);
   EXPECT_NEAR(moves[1].end[kA], 20 * kDegree, 1e-15);
   // The table is read again as it was written.
-  const std::string path =
-      (std::filesystem::temp_directory_path() / ("tools_" + std::to_string(getpid()) + ".tbl"))
-          .string();
-  std::ofstream(path) << options.tools->to_text(1e-3);
-  const ToolTable again = ToolTable::read(path, 1e-3);
-  std::filesystem::remove(path);
+  const ProgramFile table(options.tools->to_text(1e-3));
+  const ToolTable again = ToolTable::read(table.path(), 1e-3);
   ASSERT_EQ(again.all().size(), options.tools->all().size());
   for (const auto& [number, tool] : options.tools->all()) {
     EXPECT_LE((again.find(number)->offset - tool.offset).norm(), 1e-12) << number;

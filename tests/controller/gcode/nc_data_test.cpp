@@ -2,14 +2,11 @@
 #include "controller/gcode/nc_data.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
-
-#include <filesystem>
-#include <fstream>
 
 #include "controller/gcode/interpreter.hpp"
 #include "controller/program_error.hpp"
 #include "tests/controller/program_file.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc::nc_data_test {
 namespace {
@@ -114,10 +111,8 @@ TEST(NcData, BytesThatAreNoneAreRefused) {
 }
 
 TEST(ProgramPath, IsSearchedAfterThePrograms) {
-  namespace fs = std::filesystem;
-  const fs::path folder = fs::temp_directory_path() / ("subprograms_" + std::to_string(getpid()));
-  fs::create_directories(folder / "deep");
-  std::ofstream(folder / "deep" / "there.ngc") << "o<there> sub\nG0 X5\no<there> endsub\n";
+  const Scratch folder;
+  folder.write("deep/there.ngc", "o<there> sub\nG0 X5\no<there> endsub\n");
   Machine machine;
   const std::string text = "o<there> call\nM30\n";
   try {
@@ -126,9 +121,8 @@ TEST(ProgramPath, IsSearchedAfterThePrograms) {
   } catch (const ProgramError& e) {
     EXPECT_NE(std::string(e.what()).find("beside it"), std::string::npos);
   }
-  machine.nc.program_path = (folder / "none").string() + ":" + (folder / "deep").string();
+  machine.nc.program_path = folder / "none" + ":" + folder / "deep";
   const auto moves = play(text, {}, machine).moves;
-  fs::remove_all(folder);
   ASSERT_EQ(moves.size(), 1u);
   EXPECT_NEAR(moves[0].end[kX], 0.005, 1e-15);
 }
