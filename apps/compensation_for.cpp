@@ -8,6 +8,7 @@
 
 #include "bus/tick.hpp"
 #include "model/effects/chain.hpp"
+#include "model/parameters.hpp"
 
 namespace vcnc {
 namespace {
@@ -17,6 +18,8 @@ constexpr double kShortestAngle = 0.5 * kDegree;
 constexpr int kPointsPerPeriod = 64;
 constexpr double kTableStep = 2e-3, kTableAngle = 2 * kDegree;  ///< between points of a table
 constexpr int kMostPoints = 10'000;
+constexpr double kTooLittle = 20e-9;  ///< [m or rad], steps of usual encoders
+constexpr double kAsDeclared = 1e-3;
 
 struct Verdict {
   bool compensated = false;
@@ -106,6 +109,14 @@ Verdict add(Work& w, CompensationTable table) {
   return by(std::move(text));
 }
 
+Verdict add_wave(Work& w, std::size_t axis, double amplitude, double period, double phase) {
+  if (period < (is_rotary(axis) ? kShortestAngle : kShortestPeriod))
+    return no("its period is too short for set-points of 1 ms");
+  return add(w, table_over_period(axis, period, [&](double q) {
+               return amplitude * std::sin(2 * kPi / period * q + phase);
+             }));
+}
+
 Verdict both(const Verdict& a, const Verdict& b) {
   return {a.compensated || b.compensated,
           a.text + (a.text.empty() || b.text.empty() ? "" : "; ") + b.text};
@@ -145,6 +156,12 @@ Verdict windup(Work& w, std::size_t axis) {
 
 Verdict scale(Work& w, std::size_t axis) {
   const ScaleError& e = w.effects(axis).get<ScaleError>();
+  const AxisLimits& l = w.machine.axes[axis].limits;
+  const double largest =
+      std::abs(e.error) * std::max(std::abs(l.max - e.reference), std::abs(l.min - e.reference));
+  if (largest < kTooLittle)
+    return no(fmt::format("makes {} at the end of the travel, too little to count",
+                          length(largest, is_rotary(axis))));
   w.settings.axes[axis].scale = e.error;
   w.settings.axes[axis].scale_reference = e.reference;
   return by(fmt::format("scale {:.4g} um/m", e.error * 1e6));
@@ -161,18 +178,28 @@ Verdict pitch_progressive(Work& w, std::size_t axis) {
 
 Verdict pitch_periodic(Work& w, std::size_t axis) {
   const PitchPeriodic& e = w.effects(axis).get<PitchPeriodic>();
-  if (e.period < (is_rotary(axis) ? kShortestAngle : kShortestPeriod))
-    return no("its period is too short for set-points of 1 ms");
-  return add(w, table_over_period(axis, e.period, [&](double q) {
-               return e.amplitude * std::sin(2 * kPi / e.period * q + e.phase);
-             }));
+  return add_wave(w, axis, e.amplitude, e.period, e.phase);
 }
 
 /// The encoder counts A sin too much, so the axis stands so much short of what it counts.
 Verdict encoder_eccentricity(Work& w, std::size_t axis) {
   const EncoderEccentricity& e = w.effects(axis).get<EncoderEccentricity>();
-  return add(w, table_over_period(axis, 2 * kPi,
-                                  [&](double q) { return -e.amplitude * std::sin(q + e.phase); }));
+  return add_wave(w, axis, -e.amplitude, 2 * kPi, e.phase);
+}
+
+/// The load stands so much further than the motor tells.
+Verdict transmission_error(Work& w, std::size_t axis) {
+  if (!w.motor_encoder(axis))
+    return no("the measuring system on the load sees it and the loop closes it");
+  const TransmissionError& e = w.effects(axis).get<TransmissionError>();
+  return add_wave(w, axis, e.amplitude, e.period, e.phase);
+}
+
+/// What the load's encoder counts too much the axis stands short of.
+Verdict load_encoder_error(Work& w, std::size_t axis) {
+  if (w.motor_encoder(axis)) return no("the loop does not use that measuring system");
+  const LoadEncoderError& e = w.effects(axis).get<LoadEncoderError>();
+  return add_wave(w, axis, -e.amplitude, e.period, e.phase);
 }
 
 Verdict straightness(Work& w, std::size_t axis) {
@@ -290,6 +317,8 @@ constexpr Answer kAnswers[]{
     {"pitch_progressive", pitch_progressive},
     {"pitch_periodic", pitch_periodic},
     {"encoder_eccentricity", encoder_eccentricity},
+    {"transmission_error", transmission_error},
+    {"load_encoder_error", load_encoder_error},
     {"straightness", straightness},
     {"lateral_play", lateral_play},
     {"squareness", squareness},
@@ -361,6 +390,11 @@ Verdict judge(Work& w, const Deviation& deviation) {
   for (std::size_t i = 0; i < kAxisCount; ++i)
     for (const char* key : {"kv_per_s", "velocity_ff"})
       if (deviation.key == fmt::format("axes.{}.{}", kAxisNames[i], key)) return lead(w, i);
+  Machine declared = w.machine;
+  for (const Parameter& p : parameters(declared))
+    if (p.key == deviation.key &&
+        std::abs(deviation.value - p.in_unit()) < kAsDeclared * std::abs(p.in_unit()))
+      return no("is what is declared, but for less than a thousandth");
   return no("is a declared number: enter its true value in the machine file");
 }
 

@@ -9,7 +9,8 @@
 //   lost_motion, windup (motor encoder)        backlash = 2 c F_c, the part that friction makes
 //   scale_error                                scale
 //   pitch_progressive, encoder_eccentricity    a table over the travel or a turn
-//   pitch_periodic                             a table over one period, 64 points
+//   pitch_periodic, load_encoder_error, transmission_error (motor encoder)
+//                                              a table over one period, 64 points
 //   straightness                               tables of the axes across, over the travel
 //   lateral_play                               tables of the axes across with two directions
 //   squareness                                 squareness

@@ -57,6 +57,9 @@ void dragging(Machine& m, std::size_t axis) {
   friction = Coulomb::nominal(is_rotary(axis));
   friction.level *= 0.2;
 }
+void motor_encoder(Machine& m, std::size_t axis) {
+  m.axes[axis].servo.feedback = ServoParams::Feedback::motor;
+}
 void sliding(Machine& m, std::size_t axis) {
   m.effects.axis[axis].get<Coulomb>() = Coulomb::nominal(is_rotary(axis));
 }
@@ -119,6 +122,9 @@ const std::vector<Peculiarity>& peculiarities() {
        .options = quick_strokes()},
       {.effect = "encoder_quantisation", .feature = Feature::peak_to_peak, .options = creep()},
       {.effect = "encoder_subdivision", .feature = Feature::peak_to_peak, .options = creep()},
+      {.effect = "transmission_error",
+       .prepare = motor_encoder,
+       .prepared = "measuring system on the motor"},
       {.effect = "weight_imbalance", .axis = kZ},
       {.effect = "lost_motion", .prepare = sliding, .prepared = "Coulomb friction"},
       {.effect = "viscous",
@@ -231,7 +237,7 @@ ExperimentOptions options_for(Showing showing, Quantity quantity) {
     o.wall = showing == Showing::line ? Wall::none : Wall::inclined;
   if (Effect::text.family == Family::thermal) o.seconds = 60;
   // So slowly that friction, not inertia, holds the load while the motor crosses a gap.
-  if (std::is_same_v<typename Effect::Port, TransmissionPort>) o.feed_mm_min = 1500;
+  if (one_of<Effect, Windup, Backlash>) o.feed_mm_min = 1500;
   return o;
 }
 
@@ -239,7 +245,7 @@ ExperimentOptions options_for(Showing showing, Quantity quantity) {
 template <class Effect>
 std::string prepare(Machine& machine, std::size_t axis) {
   using Port = typename Effect::Port;
-  if constexpr (std::is_same_v<Port, TransmissionPort>) {
+  if constexpr (one_of<Effect, Windup, Backlash>) {
     machine.axes[axis].servo.feedback = ServoParams::Feedback::motor;
     dragging(machine, axis);
     return "measuring system on the motor, some Coulomb friction";

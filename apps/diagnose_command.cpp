@@ -71,6 +71,16 @@ void predict_tests(const DiagnoseOptions& options, const std::optional<HealthyRu
   }
 }
 
+bool same_values(const Record& a, const Record& b) {
+  return std::equal(
+      a.signals.begin(), a.signals.end(), b.signals.begin(), b.signals.end(),
+      [](const MeasuredSignal& x, const MeasuredSignal& y) {
+        const auto same = [](double p, double q) { return p == q || (p != p && q != q); };
+        return x.kind == y.kind && x.axis == y.axis &&
+               std::equal(x.value.begin(), x.value.end(), y.value.begin(), y.value.end(), same);
+      });
+}
+
 /// Nothing without --reference.
 std::optional<HealthyRun> reference_run(const DiagnoseOptions& options, const Machine& declared) {
   if (options.reference.empty()) return std::nullopt;
@@ -104,8 +114,10 @@ std::vector<Candidate> candidates_of(const DiagnoseOptions& options, const Recor
     std::erase_if(all, [&](const Candidate& c) { return is_of_unrecorded_axis(c, record); });
   for (const std::string& effect : options.without)
     if (std::erase_if(all, [&](const Candidate& c) { return c.effect == effect; }) == 0)
-      throw InputError("--without: \"" + effect +
-                       "\" is no effect that a diagnosis would try; vcnc effects lists them");
+      throw InputError(
+          "--without: \"" + effect +
+          "\" is no effect that a diagnosis would try; vcnc effects lists them, without "
+          "an axis in front");
   std::vector<std::string> numbers;
   for (const FreedNumber& n : nuisances(declared)) numbers.push_back(n.number.key);
   return suspected(std::move(all), numbers, options.suspects);
@@ -134,6 +146,9 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
     d = diagnose(of, asked, keep_going);
   }
   progress.show("predicting test runs");
+  if (healthy && same_values(record, healthy->record))
+    d.warnings.push_back(
+        "The reference run holds the same values as the run itself: no difference can be found.");
   const bool interrupted = stop_requested();  // the diagnosis says so itself
   predict_tests(options, healthy, d.declared, d.found, d.figures);
   if (stop_requested() && !interrupted)

@@ -216,7 +216,7 @@ constexpr PortDoc kPortDocs[]{
     {ServoPort::name, "at the start", "drive", "gains and limits of the loops"},
     {EncoderPort::name, "at every reading", "drive", "the position a measuring system counts"},
     {MotorForcePort::name, "every 50 us", "drive", "force of the motor"},
-    {TransmissionPort::name, "at the start", "drive", "gap, compliance and damping"},
+    {TransmissionPort::name, "at the start", "drive", "gap, compliance and damping, uneven ratio"},
     {LoadForcePort::name, "every 50 us", "drive", "further force on the table"},
     {FrictionPort::name, "every 50 us", "drive", "terms of the friction law"},
     {DisplacementPort::name, "every 100 us", "drive", "tool centre against scale, along the axis"},

@@ -23,6 +23,7 @@ constexpr double kFixed = 1e12;  ///< precision of a number that stays
 /// What an effect of the probe or the geometry must explain of what is left: less than that is the
 /// form of the contact.
 constexpr double kShareOfMeasuring = 0.05;
+constexpr double kWellOff = 10;         // times the noise
 constexpr double kNearlyAsGood = 0.95;  ///< of the most that one promises: as good
 
 /// Effects of an axis that are fitted together, or its lags.
@@ -290,6 +291,17 @@ class Commissioner {
         figures_of(of_.record, of_.replica, of_.declared, result_.machine, "all laps");
     tell_form();
     result_.warnings = evidence_.noise().warnings;
+    for (const SignalFigure& f : result_.figures)
+      if (f.after > kWellOff * f.floor) tell_what_stays_off(f);
+  }
+
+  void tell_what_stays_off(const SignalFigure& f) {
+    const ShownUnit unit = shown_unit(f.channel);
+    result_.warnings.push_back(fmt::format(
+        "{} stays {:.3g} {} rms off, {:.0f} times its noise: the model lacks something, or the "
+        "column is another signal or late; a diagnosis against this model tells of no change of "
+        "it that is smaller",
+        channel_name(f.channel), f.after * unit.factor, unit.name, f.after / f.floor));
   }
 
   /// What is left besides noise goes into the model: of what can be compared with that.

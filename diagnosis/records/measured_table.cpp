@@ -227,10 +227,12 @@ class TextTable {
     if (fields_.size() == expected + 1 && fields_.back().empty()) fields_.pop_back();
     if (fields_.size() != expected) {
       const bool commas = separator_ == Separator::comma && fields_.size() > expected;
-      fail(line_, fmt::format("{} values, expected {}{}", fields_.size(), expected,
-                              commas ? "; if the numbers have decimal commas, export them with "
-                                       "points"
-                                     : ""));
+      fail(line_,
+           fmt::format("{} values, expected {}{}", fields_.size(), expected,
+                       commas ? "; if the numbers have decimal commas, export them with "
+                                "points"
+                       : table_.rows() == 0 ? "; remarks above the line of names need a # in front"
+                                            : ""));
     }
     for (std::size_t i = 0; i < expected; ++i) {
       MeasuredColumn& column = table_.columns[i];

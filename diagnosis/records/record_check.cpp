@@ -19,12 +19,15 @@ namespace {
 
 using Series = std::vector<double>;
 
-constexpr double kSmoothing = 10e-3;  ///< [s] of all derivatives here
-constexpr double kBelongs = 0.7;      ///< correlation of what belongs together
-constexpr double kFits = 0.95;        ///< ... of what certainly does
-constexpr double kSlope = 0.1;        ///< how far a slope may be off 1
-constexpr double kLead = 2e-3;        ///< [s] that no feed-forward makes by itself
-constexpr double kMoves = 1e-4;       ///< [m or rad] of a command that every position shows
+constexpr double kSmoothing = 10e-3;        ///< [s] of all derivatives here
+constexpr double kBelongs = 0.7;            ///< correlation of what belongs together
+constexpr double kFits = 0.95;              ///< ... of what certainly does
+constexpr double kSlope = 0.1;              ///< how far a slope may be off 1
+constexpr double kLead = 2e-3;              ///< [s] that no feed-forward makes by itself
+constexpr std::size_t kEnoughToTell = 200;  // values, whether one of them stands alone
+constexpr std::size_t kOneIn = 1000;        // such bends are usual
+constexpr double kLone = 10;                // times what is usual
+constexpr double kMoves = 1e-4;             ///< [m or rad] of a command that every position shows
 constexpr std::size_t kFewestSteps = 500;
 
 struct Spread {
@@ -136,6 +139,33 @@ class Checker {
     return s ? s : record_.find(SignalKind::command, axis);
   }
 
+  /// Warns of values that stand alone far off both neighbours: no machine moves so.
+  void check_lone(const MeasuredSignal& s) {
+    const std::vector<double>& x = s.value;
+    std::vector<double> bends;  // of three values in a row
+    for (std::size_t k = 1; k + 1 < x.size(); ++k)
+      if (const double bend = std::abs(x[k - 1] - 2 * x[k] + x[k + 1]); std::isfinite(bend))
+        bends.push_back(bend);
+    if (bends.size() < kEnoughToTell) return;
+    const auto high = bends.end() - static_cast<std::ptrdiff_t>(bends.size() / kOneIn) - 1;
+    std::nth_element(bends.begin(), high, bends.end());
+    const double usual = std::max(*high, 2 * s.resolution);
+    std::size_t count = 0, first = 0;
+    for (std::size_t k = 1; k + 1 < x.size(); ++k) {
+      const double up = x[k] - x[k - 1], down = x[k] - x[k + 1];
+      if (!(up * down > 0 && std::min(std::abs(up), std::abs(down)) > kLone * usual)) continue;
+      if (count++ == 0) first = k;
+    }
+    if (count == 0) return;
+    const double off = x[first] - 0.5 * (x[first - 1] + x[first + 1]);
+    warn(
+        fmt::format("{}: {} alone far off the values before and after, the first by {:.4g} (SI) "
+                    "at {:.6g} s; if {} not measured, say so by missing = [...] in the map",
+                    name(s), count == 1 ? "1 value stands" : fmt::format("{} values stand", count),
+                    off, record_.begin + static_cast<double>(first) * record_.period,
+                    count == 1 ? "it was" : "they were"));
+  }
+
   void check_values() {
     std::size_t compared = 0, still = 0;
     for (MeasuredSignal& s : record_.signals) {
@@ -158,6 +188,7 @@ class Checker {
         warn(fmt::format("{} comes in {:.0f} coarse steps of {:.3g} (SI)", name(s), steps,
                          s.resolution));
       if (s.kind == SignalKind::force || s.kind == SignalKind::deflection || raw) check_ends(s);
+      if (!raw && s.kind != SignalKind::temperature && s.kind != SignalKind::clock) check_lone(s);
     }
     if (compared == 0)
       refuse(

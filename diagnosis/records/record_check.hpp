@@ -15,7 +15,7 @@
 //               mass, the share that is explained, the sign; five times the declared limit at most
 //   range       positions against the declared travel, speeds against the declared limit
 //   values      constant, saturated (equal extremes in a row), quantised (step of the values),
-//               missing samples
+//               missing samples, single ones far off both neighbours
 #pragma once
 
 #include <string>

@@ -43,6 +43,10 @@ struct Candidate {
 /// Whether it is of the drive of an axis: servo, friction or mechanics.
 bool is_of_drive(const Candidate& candidate);
 
+/// The range of a number of a machine file, kept so that play and compliance find a motor side that
+/// is heavy enough (AxisDrive) whatever else is changed.
+Range range_with_a_motor_side(const Machine& declared, const std::string& key, Range range);
+
 /// The candidates of a machine, in the order of the library. Those whose place the record has no
 /// signal of are left out by the caller.
 std::vector<Candidate> candidates(const Machine& declared);

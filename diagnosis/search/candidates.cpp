@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -82,12 +84,31 @@ void add_candidate(const EffectPlace& place, std::vector<Candidate>& all) {
 
 template <class Effect>
 bool can_be(const EffectPlace& place, const Machine& declared) {
-  if constexpr (std::is_same_v<typename Effect::Port, TransmissionPort>) {
+  if constexpr (std::is_same_v<Effect, Windup> || std::is_same_v<Effect, Backlash>) {
     const MechanicsParams& m = declared.axes[place.axis].mechanics;
     return m.reflected_inertia() > kLeastMotorShare * m.load;
   }
   return true;
 }
+
+}  // namespace
+
+Range range_with_a_motor_side(const Machine& declared, const std::string& key, Range range) {
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const std::string of = fmt::format("axes.{}.", kAxisNames[axis]);
+    if (!key.starts_with(of)) continue;
+    const MechanicsParams& m = declared.axes[axis].mechanics;
+    const double spare = std::sqrt(m.reflected_inertia() / (kLeastMotorShare * m.load));
+    if (!(spare > 1)) continue;  // it has none
+    if (key == of + "load_kg" || key == of + "load_kgm2")
+      range.max = std::min(range.max, 0.99 * spare * m.load);
+    if (key == of + "motor_inertia_kgm2")
+      range.min = std::max(range.min, 1.01 / spare * m.motor_inertia);
+  }
+  return range;
+}
+
+namespace {
 
 /// A zone lies within the travel of its axis and takes half of it at most: a wider one is friction
 /// as such.
@@ -110,9 +131,10 @@ void add_deviations(const Machine& declared, std::vector<Candidate>& all) {
     const bool known = std::any_of(kDeclared.begin(), kDeclared.end(),
                                    [&](std::string_view end) { return p.key.ends_with(end); });
     if (!known || p.key.starts_with("effects.") || *p.value == 0) continue;
+    const Range range = range_with_a_motor_side(declared, p.key, p.range);
     all.push_back({"deviation",
                    p.key,
-                   {{p.key, kDeviation * std::abs(p.in_unit()), p.range.min, p.range.max, false}},
+                   {{p.key, kDeviation * std::abs(p.in_unit()), range.min, range.max, false}},
                    {},
                    Family::nc});
   }

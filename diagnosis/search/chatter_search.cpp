@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <numbers>
 
 #include "diagnosis/search/freed_number.hpp"
 #include "model/axes.hpp"
@@ -81,12 +82,14 @@ class ChatterSearch {
     for (const Unrest& u : measured_) {
       const double was = before(healthy_, u);
       if (!is_of_drive(u.channel, axis) || was <= 0 || !u.rms || *u.rms < c.times * was) continue;
+      if (vcnc::is_part_of_what_is_off(*u.rms, u.off)) continue;
       c.unrest = u;
       c.times = *u.rms / was;
     }
     const NoiseLine line = strongest(evidence_.noise().lines, axis, evidence_),
                     was = strongest(healthy_.lines, axis, evidence_);
-    if (line.strength > 0 && !(was.strength > 0 && line.amplitude < 2 * was.amplitude)) {
+    const bool as_before = was.strength > 0 && line.amplitude < 2 * was.amplitude;
+    if (line.strength > 0 && !as_before && !is_part_of_what_is_off(line)) {
       c.line = line;
       c.of_model = power_at(line, evidence_.declared()[index_of(line.channel)]) >
                    kClearlyMore * power_at(line, measured(line.channel));
@@ -103,6 +106,13 @@ class ChatterSearch {
   }
 
  private:
+  bool is_part_of_what_is_off(const NoiseLine& line) const {
+    return std::any_of(measured_.begin(), measured_.end(), [&](const Unrest& u) {
+      return u.channel == line.channel &&
+             vcnc::is_part_of_what_is_off(line.amplitude / std::numbers::sqrt2, u.off);
+    });
+  }
+
   std::vector<ChatterCause> causes_of(const Chatter& chatter) const {
     std::vector<ChatterCause> causes;  // one for every run of sizes
     bool goes_on = false;
@@ -192,7 +202,7 @@ class ChatterSearch {
       const double differs = factors(rms, measured, follows ? kFollows : kAsStrong);
       most = std::isinf(most) ? differs : std::max(most, differs);
       if (is.channel.kind == chatter.unrest.channel.kind)
-        does.unrest = {is.channel, is.at_rest, rms};
+        does.unrest = {is.channel, is.at_rest, rms, 0};
     }
     does.as_strong = most <= 1;
   }

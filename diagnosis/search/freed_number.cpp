@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "diagnosis/search/candidate.hpp"
 #include "model/parameters.hpp"
 
 namespace vcnc {
@@ -163,8 +164,9 @@ std::vector<FreedNumber> nuisances(const Machine& declared, Against against) {
     if (tolerance <= 0 && !free) continue;
     // Counted in what is small, so that differences are taken near the declaration.
     const bool clamped = p.key.starts_with("effects.setup.");
-    const Range range =
-        told && !told->between.empty() ? Range{told->between[0], told->between[1]} : p.range;
+    const Range range = range_with_a_motor_side(
+        declared, p.key,
+        told && !told->between.empty() ? Range{told->between[0], told->between[1]} : p.range);
     all.push_back({.number = {.key = p.key,
                               .typical = clamped ? 10
                                          : free  ? typical_within(range, value)

@@ -9,6 +9,7 @@ namespace {
 constexpr double kStands = 0.1;        // [s] from when on
 constexpr double kMean = 0.021;        // [s]
 constexpr std::size_t kEnough = 1000;  // samples
+constexpr double kPartOfOff = 0.1;
 
 /// RMS of a signal of an axis less its moving mean while the axis has stood for a while.
 std::optional<double> at_rest(const Record& record, std::size_t axis,
@@ -36,15 +37,22 @@ std::optional<double> at_rest(const Record& record, std::size_t axis,
   return std::sqrt(squares / count);
 }
 
-/// What laps of a signal differ by while the axis is told to move.
-std::optional<double> in_motion(const Evidence& evidence, std::size_t axis,
-                                std::vector<double> series) {
+/// Of a signal while the axis is told to move; empty where that is not known.
+std::vector<double> in_motion(const Evidence& evidence, std::size_t axis,
+                              std::vector<double> series) {
   const MeasuredSignal* command = evidence.record().find(SignalKind::command, axis);
   if (!command) return {};
   const std::vector<double>& q = command->value;
   for (std::size_t k = 0; k < series.size(); ++k)
     if (k == 0 || q[k] == q[k - 1]) series[k] = kMissing;
-  return lap_scatter(evidence.partition(), series);
+  return series;
+}
+
+double rms_of_known(const std::vector<double>& series) {
+  double squares = 0, count = 0;
+  for (const double x : series)
+    if (std::isfinite(x)) squares += x * x, ++count;
+  return count > 0 ? std::sqrt(squares / count) : 0;
 }
 
 /// Of series that are found by their channel.
@@ -62,13 +70,19 @@ std::vector<Unrest> unrest_of_each(const Evidence& evidence, Series&& series_of)
       if (e.axis == axis)
         std::fill(series.begin() + static_cast<std::ptrdiff_t>(e.begin),
                   series.begin() + static_cast<std::ptrdiff_t>(e.end), kMissing);
-    all.push_back({channels[c], false, in_motion(evidence, axis, series)});
-    all.push_back({channels[c], true, at_rest(evidence.record(), axis, series)});
+    const std::vector<double> moving = in_motion(evidence, axis, series);
+    const std::optional<double> scatter =
+        moving.empty() ? std::nullopt : lap_scatter(evidence.partition(), moving);
+    const double off = rms_of_known(moving);
+    all.push_back({channels[c], false, scatter, off});
+    all.push_back({channels[c], true, at_rest(evidence.record(), axis, series), off});
   }
   return all;
 }
 
 }  // namespace
+
+bool is_part_of_what_is_off(double rms, double off) { return rms < kPartOfOff * off; }
 
 bool is_of_drive(const ComparedChannel& channel, std::size_t axis) {
   return channel.axis == axis &&

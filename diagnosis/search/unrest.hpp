@@ -8,6 +8,10 @@
 // the signals themselves differ by that. Without moments that other laps do not share
 // (lap_events.hpp).
 //
+// What is off itself differs between laps by as much as it changes within a sample: a following
+// error of 40 um, one wave per lap of 3.5 s, by 36 nm where a lap begins half a millisecond later.
+// So what is less than a tenth of what is off is no unrest, but part of that.
+//
 // Validity: an axis of which the position or the force is recorded; a vibration faster than half
 // the rate of the record shows by its strength only.
 #pragma once
@@ -23,7 +27,11 @@ struct Unrest {
   ComparedChannel channel;
   bool at_rest = false;
   std::optional<double> rms;  ///< [SI]; none where it is not known
+  double off = 0;             ///< all that the signal is off while the axis moves, RMS [SI]
 };
+
+/// Whether a vibration of that RMS may be no more than what is off, seen from another lap.
+bool is_part_of_what_is_off(double rms, double off);
 
 /// What was noise when the machine was healthy.
 struct HealthyNoise {

@@ -94,7 +94,10 @@ AxisDriveOf<Real>::AxisDriveOf(const AxisParams& declared, const AxisParams& act
     rubbing_.set(i, axis_chain<FrictionPort>(effects, axis, seed));
     displacing_.set(i, axis_chain<DisplacementPort>(effects, axis, seed));
   }
-  const double start = lane(encoder(actual.limits.start), 0);
+  TransmissionPort::Signal<double> transmission{.damping_ratio = 0.05};
+  axis_chain<TransmissionPort>(effects, axis, seed).step(transmission, {});
+  couple(transmission, actual.mechanics.load);
+  const double start = lane(encoder(ServoParams::Feedback::motor), 0);
   const double inertia = declared.mechanics.total_inertia();
   observer_ = {observer_bandwidth(declared.servo), inertia, start};
   ServoPort::Signal<double> servo{.kv = actual.servo.kv_per_s,
@@ -113,13 +116,10 @@ AxisDriveOf<Real>::AxisDriveOf(const AxisParams& declared, const AxisParams& act
   kp *= servo.velocity_gain;
   kp_ = kp;
   if (actual.servo.controller == ServoParams::Controller::sampled)
-    sampled_.emplace_back(kp, inertia, actual.servo.dead_time, start);
+    sampled_.emplace_back(kp, inertia, actual.servo.dead_time, lane(encoder(feedback_), 0));
   lag_share_ = servo.current_lag > 0 ? -std::expm1(-kPlantTime / servo.current_lag) : 1;
   position_share_ = share_of(actual.servo.position_lag);
   velocity_share_ = share_of(actual.servo.velocity_lag);
-  TransmissionPort::Signal<double> transmission{.damping_ratio = 0.05};
-  axis_chain<TransmissionPort>(effects, axis, seed).step(transmission, {});
-  couple(transmission, actual.mechanics.load);
 }
 
 template <class Real>
@@ -129,6 +129,7 @@ AxisDriveOf<Real>::AxisDriveOf(std::vector<AxisDriveOf<double>> drives)
       travel_per_turn_(drives[0].travel_per_turn_),
       force_limit_(drives[0].force_limit_),
       two_masses_(drives[0].two_masses_),
+      uneven_(std::any_of(drives.begin(), drives.end(), [](const auto& d) { return d.uneven_; })),
       laws_(drives[0].laws_) {
   for (std::size_t i = 0; i < kLanesOf<Real>; ++i) {
     AxisDriveOf<double>& drive = drives[std::min(i, drives.size() - 1)];
@@ -160,6 +161,12 @@ bool AxisDriveOf<Real>::suits(const AxisDriveOf& other) const {
 
 template <class Real>
 void AxisDriveOf<Real>::couple(const TransmissionPort::Signal<double>& transmission, double load) {
+  if (transmission.wave != 0) {
+    uneven_ = true;
+    wave_ = transmission.wave;
+    wave_number_ = 2 * kPi / transmission.wave_period;
+    wave_phase_ = transmission.wave_phase;
+  }
   if (!(transmission.compliance > 0 || transmission.gap > 0)) return;
   two_masses_ = true;
   half_gap_ = 0.5 * transmission.gap;
@@ -177,11 +184,40 @@ void AxisDriveOf<Real>::couple(const TransmissionPort::Signal<double>& transmiss
 }
 
 template <class Real>
-Real AxisDriveOf<Real>::encoder(Real position) {
+Real AxisDriveOf<Real>::unevenness() const {
+  Real ahead{};
+  if (!uneven_) return ahead;
+  for (std::size_t i = 0; i < kLanesOf<Real>; ++i)
+    if (const double wave = lane(wave_, i); wave != 0)
+      set_lane(ahead, i,
+               wave * std::sin(lane(wave_number_, i) * lane(x_motor_, i) + lane(wave_phase_, i)));
+  return ahead;
+}
+
+/// x_motor_ is where the motor would be with an even transmission; it is at x_motor_ - u(x_motor_),
+/// so that  m_r x_motor'' = F - F_s + m_r u'',  u = A sin(k x + psi),  u'' = u' a - k^2 u v^2. The
+/// acceleration is that of the loop step before; |u'| << 1.
+template <class Real>
+Real AxisDriveOf<Real>::force_of_unevenness() const {
+  Real change{};
+  for (std::size_t i = 0; i < kLanesOf<Real>; ++i) {
+    const double wave = lane(wave_, i), k = lane(wave_number_, i), v = lane(v_motor_, i);
+    if (wave == 0) continue;
+    const double angle = k * lane(x_motor_, i) + lane(wave_phase_, i);
+    set_lane(change, i,
+             wave * k * (std::cos(angle) * lane(a_load_, i) - k * std::sin(angle) * v * v));
+  }
+  return motor_inertia_ * change;
+}
+
+template <class Real>
+Real AxisDriveOf<Real>::encoder(ServoParams::Feedback side) {
+  const bool of_load = side == ServoParams::Feedback::load;
+  Real position = of_load ? x_load_ : x_motor_ - unevenness();
   if (encoder_shift_ != 0) position += encoder_shift_;
   counting_.each_active([&](Chain<EncoderPort>& chain, std::size_t i) {
     EncoderPort::Signal<double> signal{lane(position, i)};
-    chain.step(signal, {});
+    chain.step(signal, {of_load});
     set_lane(position, i, signal.position);
   });
   return position;
@@ -270,7 +306,7 @@ AxisCycleOf<Real> AxisDriveOf<Real>::hold() {
 template <class Real>
 void AxisDriveOf<Real>::follow_up() {
   using std::abs;
-  const Real measured = encoder(feedback_ == ServoParams::Feedback::motor ? x_motor_ : x_load_);
+  const Real measured = encoder(feedback_);
   const Real told = setpoint_.velocity, seen = observer_.velocity();
   setpoint_ = last_raw_ = last_shaped_ = {measured, choose(abs(seen) < abs(told), seen, told)};
   position_error_ = 0.0;
@@ -329,14 +365,15 @@ AxisCycleOf<Real> AxisDriveOf<Real>::run(const Course& course) {
       mean_force += force_ / kPlantStepsPerLoop;
       move_plant();
     }
-    observer_.step(mean_force, encoder(x_motor_));
+    observer_.step(mean_force, encoder(ServoParams::Feedback::motor));
     cycle.truth[i] = displaced(velocity_before);
     now = next;
   }
   setpoint_ = last_raw_ = course.back();
   last_shaped_ = now;
   ++cycle_;
-  const Real motor = encoder(x_motor_), load = encoder(x_load_);
+  const Real motor = encoder(ServoParams::Feedback::motor),
+             load = encoder(ServoParams::Feedback::load);
   cycle.measured = feedback_ == ServoParams::Feedback::motor ? motor : load;
   cycle.second = load - motor;
   cycle.force = force_ / force_limit_;
@@ -351,7 +388,7 @@ AxisCycleOf<Real> AxisDriveOf<Real>::run(const Course& course) {
 template <class Real>
 Real AxisDriveOf<Real>::control(const Setpoint& now, const Setpoint& next) {
   using std::max, std::min;
-  const Real measured = encoder(feedback_ == ServoParams::Feedback::motor ? x_motor_ : x_load_);
+  const Real measured = encoder(feedback_);
   position_error_ = lagged(position_error_, now.position - measured, position_share_);
   const Real v_ref = servo_.kv * position_error_ + servo_.velocity_ff * now.velocity;
   velocity_ = lagged(velocity_, observer_.velocity(), velocity_share_);
@@ -395,6 +432,7 @@ void AxisDriveOf<Real>::move_plant() {
                         .axes = motions(i)});
     set_lane(force, i, signal.force);
   });
+  if (uneven_) force += force_of_unevenness();
   if (force_known_)
     load_force_ = known(&KnownForce::applied, loop_ + (plant_step_ + 0.5) / kPlantStepsPerLoop);
   load_.each_active([&](Chain<LoadForcePort>& chain, std::size_t i) {

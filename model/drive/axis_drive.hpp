@@ -29,6 +29,10 @@
 //                F_s = K g(x_m - x) + D (x_m' - x')
 //                g(z) = z -+ b/2 outside the gap b, 0 inside (D off inside)
 //   backlash without compliance: the same, the sides of the gap as stiff as K may be
+//   uneven transmission: the motor is at x_m - u, u = A sin(k x_m + psi), which its measuring
+//   system
+//                counts, and its inertia follows: m_r (x_m - u)'' in place of m_r x_m''; of a rigid
+//                axis J x'' - m_r u''
 //
 // Integration: rigid exactly for a force constant over the step; two masses by the symplectic Euler
 // rule, with K limited to a resonance of 1.6 kHz (10 kN then wind the spring up by less than
@@ -242,7 +246,12 @@ class AxisDriveOf {
   void move_two_masses(Real force, Real load_force);
   Real rub(Real v, Real v_free, Real inertia);
   Real displaced(Real velocity_before);
-  Real encoder(Real position);
+  /// How far the load is ahead of the motor by an uneven transmission, and what force the motor's
+  /// inertia adds when it is moved by that.
+  Real unevenness() const;
+  Real force_of_unevenness() const;
+  /// What the measuring system of that side counts.
+  Real encoder(ServoParams::Feedback side);
   Moment moment(double dt, int steps_per_loop, int step) const;
   void update_motions(int steps_ahead);
   const Motions<double>* motions(std::size_t lane) const {
@@ -261,6 +270,8 @@ class AxisDriveOf {
   Real kp_{}, lag_share_{}, position_share_{}, velocity_share_{};
   bool two_masses_ = false;
   Real stiffness_{}, damping_{}, half_gap_{};
+  bool uneven_ = false;
+  Real wave_{}, wave_number_{}, wave_phase_{};  ///< of an uneven transmission
 
   // Effects.
   Chains<ReceptionPort> reception_;
@@ -297,8 +308,8 @@ class AxisDriveOf {
                  load_inertia_, servo_.kv, servo_.velocity_gain, servo_.integral_time,
                  servo_.velocity_ff, servo_.acceleration_ff, servo_.current_lag, servo_.force_limit,
                  kp_, lag_share_, position_share_, velocity_share_, stiffness_, damping_, half_gap_,
-                 x_load_, x_motor_, last_raw_.position, last_raw_.velocity, last_shaped_.position,
-                 last_shaped_.velocity),
+                 wave_, wave_number_, wave_phase_, x_load_, x_motor_, last_raw_.position,
+                 last_raw_.velocity, last_shaped_.position, last_shaped_.velocity),
         observer_.numbers());
   }
 };

@@ -42,6 +42,7 @@
 #include "model/effects/integral_time_error.hpp"
 #include "model/effects/kv_error.hpp"
 #include "model/effects/lateral_play.hpp"
+#include "model/effects/load_encoder_error.hpp"
 #include "model/effects/load_play.hpp"
 #include "model/effects/lost_motion.hpp"
 #include "model/effects/mains_hum.hpp"
@@ -80,6 +81,7 @@
 #include "model/effects/torque_constant_error.hpp"
 #include "model/effects/torque_limit.hpp"
 #include "model/effects/torque_ripple.hpp"
+#include "model/effects/transmission_error.hpp"
 #include "model/effects/velocity_ff_error.hpp"
 #include "model/effects/velocity_gain_error.hpp"
 #include "model/effects/viscous.hpp"
@@ -98,12 +100,12 @@ using AllEffects = EffectList<
     BusLoss, BusLatency, BusJitter,
     // servo and encoder
     CommandDelay, KvError, VelocityFfError, AccelerationFfError, IntegralTimeError,
-    VelocityGainError, CurrentLag, TorqueLimit, EncoderEccentricity, EncoderSubdivision,
-    EncoderQuantisation,
+    VelocityGainError, CurrentLag, TorqueLimit, LoadEncoderError, EncoderEccentricity,
+    EncoderSubdivision, EncoderQuantisation,
     // force of the motor
     TorqueConstantError, TorqueRipple, Cogging,
     // transmission
-    Windup, Backlash,
+    Windup, Backlash, TransmissionError,
     // friction: terms first, then what changes them
     Coulomb, Stribeck, GreaseDrag, Viscous, NonlinearViscous, Presliding, FrictionAsymmetry,
     FrictionZone, FrictionFade,

@@ -131,7 +131,9 @@ struct EncoderPort {
     T position{};
   };
   template <class T>
-  struct Context {};
+  struct Context {
+    bool of_load{};  ///< the measuring system on the load; else that on the motor
+  };
 };
 
 /// Force of the motor, on the load side.
@@ -160,6 +162,8 @@ struct TransmissionPort {
     T gap{};            ///< [m or rad]
     T compliance{};     ///< [m/N or rad/(N m)], 0 = rigid
     T damping_ratio{};  ///< of the free resonance
+    /// The load is ahead of the motor by wave sin(2 pi q/period + phase); none where wave is 0.
+    T wave{}, wave_period{}, wave_phase{};
   };
   template <class T>
   struct Context {};

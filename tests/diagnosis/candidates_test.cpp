@@ -5,6 +5,8 @@
 #include "configs/config.hpp"
 #include "diagnosis/replica/effect_stage.hpp"
 #include "diagnosis/search/candidate.hpp"
+#include "diagnosis/search/freed_number.hpp"
+#include "model/drive/axis_drive.hpp"
 #include "model/parameters.hpp"
 
 namespace vcnc::candidates_test {
@@ -69,6 +71,22 @@ TEST(Candidates, PlayNeedsAMotorSide) {
     EXPECT_NE(c.name(), "X.backlash");
     EXPECT_NE(c.name(), "X.windup");
   }
+}
+
+/// However masses are tried, together too: a drive with play refuses a motor that is too light.
+TEST(Candidates, LeaveAMotorSideThatPlayCanStrike) {
+  Machine light = machine();
+  light.axes[kX].mechanics.motor_inertia *= 0.01;
+  light.effects.axis[kX].get<Backlash>().gap = 5e-6;
+  int met = 0;
+  for (const Candidate& c : candidates(light)) {
+    if (c.place == "axes.X.load_kg") ++met, move_number(light, c.place, c.numbers[0].max);
+    if (c.place == "axes.X.motor_inertia_kgm2")
+      ++met, move_number(light, c.place, c.numbers[0].min);
+  }
+  EXPECT_EQ(met, 2);
+  EXPECT_NO_THROW(AxisDrive(light, kX, 1));
+  EXPECT_GT(actual(light).axes[kX].mechanics.load, 3 * machine().axes[kX].mechanics.load);
 }
 
 TEST(Candidates, SidesAreThoseOfTheNullValue) {

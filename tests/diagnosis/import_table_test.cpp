@@ -383,6 +383,14 @@ TEST(ImportTable, WarnsOfWhatIsOnlySuspicious) {
       "force", [](double t) { return std::clamp(LinearAxis::force(t - 0.004), -60.0, 60.0); },
       sound_map());
   EXPECT_TRUE(warned(clipped, "may be saturated")) << all_warnings(clipped);
+  const Record spiky = with(
+      "force",
+      [](double t) { return LinearAxis::force(t - 0.004) + (std::abs(t - 2.5) < 1e-6 ? 400 : 0); },
+      sound_map());
+  EXPECT_TRUE(warned(spiky,
+                     "1 value stands alone far off the values before and after, the first "
+                     "by 400"))
+      << all_warnings(spiky);
   const Record scaled = with(
       "force", [](double t) { return 1000 * LinearAxis::force(t - 0.004); }, sound_map());
   EXPECT_TRUE(warned(scaled, "times the declared inertia")) << all_warnings(scaled);

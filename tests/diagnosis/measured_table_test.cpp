@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "diagnosis/records/time_base.hpp"
 
@@ -61,6 +62,9 @@ TEST(MeasuredTable, RefusesWithLineAndReason) {
                       "decimal commas"),
             std::string::npos);
   EXPECT_NE(refusal("t,q\n0,1\n2\n").find("run.csv:3: 1 values, expected 2"), std::string::npos);
+  EXPECT_NE(
+      refusal("Report of machine\nt,q\n0,1\n").find("run.csv:3: 1 values, expected 3; remarks"),
+      std::string::npos);
   EXPECT_NE(refusal("t,q\n0,\"1\n").find("run.csv:2: a quote is not closed"), std::string::npos);
   EXPECT_NE(refusal("t,q\r0,1\r").find("run.csv:1: lines end with a carriage return alone"),
             std::string::npos);
@@ -86,6 +90,17 @@ TEST(TimeBaseOfStamps, IsTheGridWithItsGapsAndItsJitter) {
   EXPECT_EQ(base.index[300], 305u);
   EXPECT_NEAR(base.jitter, 20e-6, 1e-6);  // the rms of +-20 us is 20 us
   EXPECT_NEAR(base.begin, 5, 1e-6);
+}
+
+TEST(TimeBaseOfStamps, FindsTheGridOfStampsThatJitterByNearlyHalfOfIt) {
+  std::mt19937 random(5);
+  std::vector<double> time;
+  for (int k = 0; k < 20000; ++k)
+    time.push_back(3 + 1e-3 * (k + 0.9 * (static_cast<double>(random()) / 4294967296.0 - 0.5)));
+  const TimeBase base = time_base(time, 0.49, numbered(time.size()));
+  EXPECT_NEAR(base.period, 1e-3, 1e-8);
+  EXPECT_EQ(base.samples, 20000u);
+  EXPECT_EQ(base.lost, 0u);
 }
 
 TEST(TimeBaseOfStamps, RefusesTimeThatFitsNoGrid) {

@@ -38,9 +38,9 @@ std::pair<double, double> of_signal(const std::vector<Unrest>& all, SignalKind k
   return rms;
 }
 
-/// Of the force of X, where `more` is added to the noise at every sample of a lap.
+/// Of a run where `more` is added to the noise of the force of X at every sample of a lap.
 template <class F>
-std::pair<double, double> in_motion_and_at_rest(F&& more) {
+std::vector<Unrest> unrest_with(F&& more) {
   Record record = to_and_fro();
   toy::measure(record, {}, 21);
   for (MeasuredSignal& s : record.signals)
@@ -49,7 +49,13 @@ std::pair<double, double> in_motion_and_at_rest(F&& more) {
         s.value[k] += more(k, k % (kMoves + kStands) >= kMoves);
   toy::ToyReplica replica(record);
   const Evidence evidence(record, replica, {});
-  return of_signal(unrest_of(evidence), SignalKind::force);
+  return unrest_of(evidence);
+}
+
+/// Of the force of X.
+template <class F>
+std::pair<double, double> in_motion_and_at_rest(F&& more) {
+  return of_signal(unrest_with(more), SignalKind::force);
 }
 
 double wave(std::size_t k, double hertz) {
@@ -71,6 +77,26 @@ TEST(Unrest, TellsTremblingAtRestFromThatInMotion) {
     });
     EXPECT_NEAR(stands ? rest : motion, strong / std::sqrt(2.0), 0.1 * strong);
     EXPECT_LT(stands ? motion : rest, 2 * toy::kForceNoise);
+  }
+}
+
+TEST(Unrest, OfLapsThatBeginWithinASampleIsPartOfWhatIsOff) {
+  constexpr std::size_t kLap = kMoves + kStands;
+  const double large = 1e5 * toy::kForceNoise;
+  const auto later = [&](std::size_t k, bool at_rest) {
+    const double within = static_cast<double>(k % kLap) + (k / kLap % 2 == 0 ? 0 : 0.5);
+    return at_rest ? 0 : large * std::sin(2 * kPi * within / kMoves);
+  };
+  const auto trembling = [&](std::size_t k, bool) {
+    return 50 * toy::kForceNoise * wave(k, 171.37);
+  };
+  for (const bool trembles : {false, true}) {
+    const std::vector<Unrest> all = trembles ? unrest_with(trembling) : unrest_with(later);
+    for (const Unrest& u : all) {
+      if (u.channel.kind != SignalKind::force || u.at_rest) continue;
+      EXPECT_GT(*u.rms, 10 * toy::kForceNoise);
+      EXPECT_EQ(is_part_of_what_is_off(*u.rms, u.off), !trembles) << *u.rms << " of " << u.off;
+    }
   }
 }
 

@@ -166,6 +166,9 @@ struct PortSamples<TransmissionPort> {
     f(s.gap, positive(0, 1e-4, 1));
     f(s.compliance, positive(0, rotary ? 1e-5 : 1e-7, 1));
     f(s.damping_ratio, positive(0.01, 0.5, 10));
+    f(s.wave, within(1e-6, 1));
+    f(s.wave_period, positive(1e-3, 1, 1e6));
+    f(s.wave_phase, within(3, 10));
   }
   template <class C, class F>
   static void context(C&, F&&, bool) {}
@@ -330,6 +333,7 @@ struct Sample {
       context.force_limit = rotary ? 500 : 4e4;
     }
     if constexpr (requires { context.spring_rate; }) context.spring_rate = 1324;
+    if constexpr (requires { context.of_load; }) context.of_load = count % 2 != 0;
     if constexpr (requires { context.channel; }) {
       context.channel = static_cast<int>(count % 3);
       context.amplitude = 0.5;

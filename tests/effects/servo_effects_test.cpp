@@ -351,6 +351,63 @@ TEST(EncoderSubdivision, FastWavesPassAsTheClosedLoopLets) {
   }
 }
 
+/// One wave per second; calls at(cycle, command, wave, what of it a position loop follows) when the
+/// loop has settled.
+template <class Effect, class At>
+void pass_waves(ServoParams::Feedback feedback, const Effect& effect, At&& at) {
+  AxisParams p = axis();
+  p.servo.feedback = feedback;
+  AxisDrive drive(p, only(effect));
+  const double v = effect.period, w = 2 * kPi, kv = p.servo.kv_per_s;
+  for (int k = 1; k <= 3000; ++k) {
+    const double x = v * kCycle * k;
+    const AxisCycle cycle = drive.follow({x, v});
+    if (k < 1000) continue;
+    const double angle = w / effect.period * cycle.truth.back() + effect.phase;
+    ASSERT_NEAR(cycle.second, effect.amplitude * std::sin(angle), 4e-4 * effect.amplitude);
+    const double followed =
+        std::sin(angle - std::atan(w / kv)) / std::hypot(1, w / kv);  // Kv/(s + Kv)
+    at(cycle, x, effect.amplitude * std::sin(angle), effect.amplitude * followed);
+  }
+}
+
+TEST(TransmissionError, MovesTheLoadIfTheLoopIsClosedOnTheMotor) {
+  const TransmissionError effect{.amplitude = 1 * kUm, .period = 20e-3, .phase = 1.1};
+  const double within = 5e-3 * effect.amplitude;
+  const MechanicsParams m = axis().mechanics;
+  const double w2 = 4 * kPi * kPi, force = 0.02 * w2 * m.total_inertia() * effect.amplitude;
+  pass_waves(ServoParams::Feedback::motor, effect,
+             [&](const AxisCycle& cycle, double x, double wave, double) {
+               ASSERT_NEAR(cycle.truth.back() - x, wave, within);
+               ASSERT_NEAR(cycle.measured, x, within);
+               // The load alone is accelerated by the wave.
+               ASSERT_NEAR(cycle.force * m.force_limit, -w2 * m.load * wave, force);
+             });
+  pass_waves(ServoParams::Feedback::load, effect,
+             [&](const AxisCycle& cycle, double x, double wave, double followed) {
+               ASSERT_NEAR(cycle.truth.back() - x, wave - followed, within);  // s/(s + Kv)
+               ASSERT_NEAR(cycle.force * m.force_limit,
+                           -w2 * (m.load * (wave - followed) - m.reflected_inertia() * followed),
+                           force);
+               ASSERT_EQ(cycle.measured, cycle.truth.back());
+             });
+}
+
+TEST(LoadEncoderError, MovesTheLoadIfTheLoopIsClosedOnIt) {
+  const LoadEncoderError effect{.amplitude = 1 * kUm, .period = 20e-3, .phase = 1.1};
+  const double within = 5e-3 * effect.amplitude;
+  pass_waves(ServoParams::Feedback::load, effect,
+             [&](const AxisCycle& cycle, double x, double wave, double followed) {
+               ASSERT_NEAR(cycle.truth.back() - x, -followed, within);
+               ASSERT_NEAR(cycle.measured, cycle.truth.back() + wave, 1e-12);
+             });
+  pass_waves(ServoParams::Feedback::motor, effect,
+             [&](const AxisCycle& cycle, double x, double, double) {
+               ASSERT_NEAR(cycle.truth.back(), x, within);
+               ASSERT_EQ(cycle.measured, cycle.truth.back());
+             });
+}
+
 TEST(EncoderEccentricity, TheAxisIsOffByMinusTheError) {
   Machine machine;
   // Graduation of 100 mm diameter, 2 um off its centre: 412 e/D = 8.24 arcsec (Heidenhain).

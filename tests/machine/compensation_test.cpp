@@ -43,9 +43,9 @@ ExperimentOptions guide() {
   o.wall = Wall::guide;
   return o;
 }
-ExperimentOptions slowly() {
+ExperimentOptions at_feed(double mm_min) {
   ExperimentOptions o;
-  o.feed_mm_min = 1500;
+  o.feed_mm_min = mm_min;
   return o;
 }
 
@@ -170,11 +170,11 @@ INSTANTIATE_TEST_SUITE_P(
                of<Backlash>(m, kX).gap = 12 * kUm;
                of<Coulomb>(m, kX).level = 50;
              },
-             Showing::circle, kX, slowly(), rms, kHalfGap* kRms, 0.03, 0.1, 1.9},
+             Showing::circle, kX, at_feed(1500), rms, kHalfGap* kRms, 0.03, 0.1, 1.9},
         Case{"load_play", [](Machine& m) { of<LoadPlay>(m, kY).width = 12 * kUm; }, Showing::circle,
-             kY, slowly(), rms, kHalfGap* kRms, 0.03, 0.05, 1.9},
+             kY, at_feed(1500), rms, kHalfGap* kRms, 0.03, 0.05, 1.9},
         Case{"load_play_quickly", [](Machine& m) { of<LoadPlay>(m, kY).width = 12 * kUm; },
-             Showing::circle, kY, slowly(), rms, kHalfGap* kRms, 0.03, 0.01, 1.9, 7e-3},
+             Showing::circle, kY, at_feed(1500), rms, kHalfGap* kRms, 0.03, 0.01, 1.9, 7e-3},
         Case{"lost_motion",
              [](Machine& m) {
                of<LostMotion>(m, kX).compliance = 10e-9;
@@ -224,7 +224,25 @@ INSTANTIATE_TEST_SUITE_P(
                                                  .phase = 0.4};
              },
              Showing::spin, kC, along_y(), max_abs, 30 * unit::arcsec.to_si * 30e-3, 0.05, 0.02,
-             1.9}),
+             1.9},
+        Case{"transmission_error",
+             [](Machine& m) {
+               m.axes[kX].servo.feedback = ServoParams::Feedback::motor;
+               of<TransmissionError>(m, kX) = {4 * kUm, 10e-3, 0.4};
+             },
+             Showing::line,
+             kX,
+             {},
+             max_abs,
+             4 * kUm,
+             0.02,
+             0.02,
+             1.95},
+        Case{"load_encoder_error",
+             [](Machine& m) {
+               of<LoadEncoderError>(m, kY) = {4 * kUm, 20e-3, 0.4};
+             },
+             Showing::line, kY, at_feed(300), max_abs, 4 * kUm, 0.02, 0.06, 1.95}),
     [](const auto& one) { return std::string(one.param.name); });
 
 // ---------------------------------------------------------------------------------- the NC unit

@@ -177,6 +177,13 @@ const std::map<std::string, Check>& checks() {
        [](const Shown& s) {  // A times the lever of 30 mm, once per turn
          near(harmonic(s.off.front(), 1).amplitude(), 8 * unit::arcsec.to_si * 0.030, 0.01);
        }},
+      {"transmission_error",
+       [](const Shown& s) { near(wave(s.off.front(), 10e-3).amplitude(), 2 * kUm, 0.01); }},
+      {"load_encoder_error",
+       [](const Shown& s) {  // as far as a position loop of 40/s follows
+         const double w = 2 * kPi * s.d.with.passes.front().feed / 20e-3;
+         near(wave(s.off.front(), 20e-3).amplitude(), 2 * kUm / std::hypot(1, w / 40), 0.005);
+       }},
       {"encoder_subdivision",
        [](const Shown& s) { near(wave(s.off.front(), 20e-6).amplitude(), 200e-9, 0.03); }},
       {"encoder_quantisation",

@@ -35,6 +35,8 @@ NAMES = {
     "constant_force": 0.0, "turning_force": 0.0, "turning_angle": 0.0,
     "spring_1": 0.0, "spring_3": 0.0, "spring_rest": 0.0,
     "encoder_wave": 0.0, "encoder_amplitude": 0.0, "encoder_phase": 0.0,
+    "motor_encoder_wave": 0.0, "motor_encoder_amplitude": 0.0, "motor_encoder_phase": 0.0,
+    "load_encoder_wave": 0.0, "load_encoder_amplitude": 0.0, "load_encoder_phase": 0.0,
     "motor_feedback": 0.0, "loop_noise": 1e-9,
 }
 
@@ -123,6 +125,17 @@ def simulate(commands, drives, seed):
     def reading(x):
         return x + d.encoder_amplitude * np.sin(d.encoder_wave * x + d.encoder_phase) if has_encoder else x
 
+    one_sided = bool(np.any(d.motor_encoder_amplitude != 0) or np.any(d.load_encoder_amplitude != 0))
+
+    def of_motor(x):
+        return d.motor_encoder_amplitude * np.sin(d.motor_encoder_wave * x + d.motor_encoder_phase)
+
+    def of_load(x):
+        return d.load_encoder_amplitude * np.sin(d.load_encoder_wave * x + d.load_encoder_phase)
+
+    def fed_back(x):
+        return np.where(motor_feedback, of_motor(x), of_load(x)) if one_sided else 0.0
+
     load = np.repeat(commands[0][:, None], runs, axis=1).astype(float)
     motor = load.copy()
     v_load = np.zeros((5, runs))
@@ -133,7 +146,7 @@ def simulate(commands, drives, seed):
     force = np.zeros((5, runs))
     waiting = np.zeros((5, runs))
     velocity = np.zeros((5, runs))
-    before = reading(load)
+    before = reading(load) + (of_motor(load) if one_sided else 0.0)
     v_ref_position = np.zeros((5, runs))
     factor = np.ones((5, runs))
     external = d.constant_force.copy()
@@ -149,9 +162,9 @@ def simulate(commands, drives, seed):
         noise = rng.standard_normal((kLoopsPerTick, 5, runs)) * d.loop_noise
         here = commands[k][:, None]
         measured = reading(np.where(motor_feedback, motor, load))
-        out["measured"][k] = measured - here
+        out["measured"][k] = measured + fed_back(measured) - here
         out["load"][k] = load - here
-        out["twist"][k] = load - motor
+        out["twist"][k] = load - motor + (of_load(load) - of_motor(motor) if one_sided else 0.0)
         out["force"][k] = force
         t = k * kTick
         for axis, run, f in d.friction_factor:
@@ -166,8 +179,10 @@ def simulate(commands, drives, seed):
         for j in range(kLoopsPerTick):
             x = reading(np.where(motor_feedback, motor, load)) if mixed else reading(motor)
             x = x + noise[j]
-            velocity += filter_gain * ((x - before) * kLoop - velocity)
-            before = x
+            turned = x + of_motor(x) if one_sided else x  # what the motor counts, for its velocity
+            x = x + fed_back(x)
+            velocity += filter_gain * ((turned - before) * kLoop - velocity)
+            before = turned
             if j % kPositionEvery == 0:
                 v_ref_position = d.kv * (x_ref[j] - x)
             error = v_ref_position + v_ff[j]

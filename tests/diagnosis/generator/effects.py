@@ -143,6 +143,24 @@ def encoder_eccentricity(m, axis, p):
     m.axis["encoder_phase"][axis] = np.deg2rad(p["phase_deg"])
 
 
+@effect(ALL, amplitude_um=lin(2), amplitude_arcsec=rot(8), phase_deg=phase,
+        period_mm=lambda rng, place: 20.0 if place in LINEAR else None,
+        period_deg=lambda rng, place: 360.0 if place in ROTARY else None)
+def load_encoder_error(m, axis, p):
+    m.axis["load_encoder_amplitude"][axis] = pick(p, "amplitude_um", "amplitude_arcsec")
+    m.axis["load_encoder_wave"][axis] = TURN / pick(p, "period_mm", "period_deg")
+    m.axis["load_encoder_phase"][axis] = np.deg2rad(p["phase_deg"])
+
+
+@effect(ALL, amplitude_um=lin(2), amplitude_arcsec=rot(8), phase_deg=phase,
+        period_mm=lambda rng, place: 12.0 if place in LINEAR else None,
+        period_deg=lambda rng, place: 18.0 if place in ROTARY else None)
+def transmission_error(m, axis, p):
+    m.axis["motor_encoder_amplitude"][axis] = -pick(p, "amplitude_um", "amplitude_arcsec")
+    m.axis["motor_encoder_wave"][axis] = TURN / pick(p, "period_mm", "period_deg")
+    m.axis["motor_encoder_phase"][axis] = np.deg2rad(p["phase_deg"])
+
+
 @effect("XY", delay_cycles=fixed(1.0))
 def bus_latency(m, axis, p):
     n = int(p["delay_cycles"])

@@ -108,6 +108,20 @@ class Drives(unittest.TestCase):
         twist = drives.simulate(commands, d, 1)["twist"][:, 0, 0].astype(float)
         self.assertAlmostEqual(twist[2000] - twist[1000], 10e-6 + 2 * 20 / 1e8, delta=0.05e-6)
 
+    def test_error_of_one_measuring_system(self):
+        """Both show between the systems; the load moves where its own is in error and closes the loop, by Kv/(s + Kv)."""
+        v, period = 0.02, 0.02
+        to = {"amplitude": 2e-6, "wave": 2 * np.pi / period, "phase": 0.4}
+        commands = ramp(4000, v)
+        waves, angle = 2 * np.pi * v / period, to["wave"] * commands[1000:, 0] + to["phase"]
+        for side, sign in (("motor", -1), ("load", 1)):
+            d = bare(**{f"{side}_encoder_{k}": value for k, value in to.items()})
+            out = {k: v[1000:, 0, 0].astype(float) for k, v in drives.simulate(commands, d, 1).items()}
+            np.testing.assert_allclose(out["twist"], sign * 2e-6 * np.sin(angle), atol=5e-9)
+            off = out["load"] - out["load"].mean()
+            follows = 2e-6 / np.hypot(1, waves / d.kv[0, 0])
+            self.assertAlmostEqual(np.sqrt(2) * off.std() / (follows if side == "load" else follows * waves / d.kv[0, 0]), 1, delta=0.05)
+
     def test_delay_of_the_set_point(self):
         d = bare()
         d.command = {(0, 0): lambda s: drives.spline_values(s, -0.5e-3)}
