@@ -18,7 +18,7 @@ constexpr double kShortestAngle = 0.5 * kDegree;
 constexpr int kPointsPerPeriod = 64;
 constexpr double kTableStep = 2e-3, kTableAngle = 2 * kDegree;  ///< between points of a table
 constexpr int kMostPoints = 10'000;
-constexpr double kTooLittle = 20e-9;  ///< [m or rad], steps of usual encoders
+constexpr double kTooLittle = 0.1e-6;  ///< [m or rad] at the end of the travel
 constexpr double kAsDeclared = 1e-3;
 
 struct Verdict {
@@ -386,15 +386,19 @@ Verdict judge(Work& w, const Law& law) {
   return add(w, std::move(table));
 }
 
+/// A number that was fitted and came out as it was: nothing to be told.
+bool is_as_declared(const Machine& machine, const Deviation& deviation) {
+  Machine declared = machine;
+  for (const Parameter& p : parameters(declared))
+    if (p.key == deviation.key)
+      return std::abs(deviation.value - p.in_unit()) < kAsDeclared * std::abs(p.in_unit());
+  return false;
+}
+
 Verdict judge(Work& w, const Deviation& deviation) {
   for (std::size_t i = 0; i < kAxisCount; ++i)
     for (const char* key : {"kv_per_s", "velocity_ff"})
       if (deviation.key == fmt::format("axes.{}.{}", kAxisNames[i], key)) return lead(w, i);
-  Machine declared = w.machine;
-  for (const Parameter& p : parameters(declared))
-    if (p.key == deviation.key &&
-        std::abs(deviation.value - p.in_unit()) < kAsDeclared * std::abs(p.in_unit()))
-      return no("is what is declared, but for less than a thousandth");
   return no("is a declared number: enter its true value in the machine file");
 }
 
@@ -441,7 +445,7 @@ CompensationProposal compensation_for(const Machine& machine) {
          judge(w, law));
   }
   for (const Deviation& deviation : machine.effects.deviations)
-    note(deviation.key, judge(w, deviation));
+    if (!is_as_declared(machine, deviation)) note(deviation.key, judge(w, deviation));
   for (std::size_t i = 0; i < kAxisCount; ++i)
     if (const Verdict declared = lead(w, i);
         declared.compensated && machine.axes[i].servo.velocity_ff != 1)

@@ -245,6 +245,23 @@ INSTANTIATE_TEST_SUITE_P(
              Showing::line, kY, at_feed(300), max_abs, 4 * kUm, 0.02, 0.06, 1.95}),
     [](const auto& one) { return std::string(one.param.name); });
 
+/// Numbers that a diagnosis fitted and that came out as they were are no work for the control.
+TEST(CompensationFor, LeavesOutWhatIsNextToNothing) {
+  Machine machine = ideal_machine();
+  of<ScaleError>(machine, kX).error = 0.07e-6;
+  of<ScaleError>(machine, kY).error = 7e-6;
+  const double load = machine.axes[kX].mechanics.load;
+  machine.effects.deviations = {{"axes.X.load_kg", load * (1 + 1e-6)},
+                                {"axes.Y.load_kg", 1.1 * machine.axes[kY].mechanics.load}};
+  const CompensationProposal proposal = compensation_for(machine);
+  std::string told;
+  for (const CompensationRemark& r : proposal.remarks)
+    told += r.effect + (r.compensated ? "+ " : "- ");
+  EXPECT_EQ(told, "X.scale_error- Y.scale_error+ axes.Y.load_kg- ");
+  EXPECT_EQ(proposal.settings.axes[kX].scale, 0);
+  EXPECT_EQ(proposal.settings.axes[kY].scale, 7e-6);
+}
+
 // ---------------------------------------------------------------------------------- the NC unit
 
 const char* const kSquare = "G54 G90 G17 G21 G94 G49\nG64 P0.02\nG1 X20 F3000\nY20\nX0\nY0\nM30\n";
