@@ -246,7 +246,7 @@ template <class Effect>
 std::string prepare(Machine& machine, std::size_t axis) {
   using Port = typename Effect::Port;
   if constexpr (one_of<Effect, Windup, Backlash>) {
-    machine.axes[axis].servo.feedback = ServoParams::Feedback::motor;
+    motor_encoder(machine, axis);
     dragging(machine, axis);
     return "measuring system on the motor, some Coulomb friction";
   }

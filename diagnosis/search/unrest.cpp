@@ -9,7 +9,7 @@ namespace {
 constexpr double kStands = 0.1;        // [s] from when on
 constexpr double kMean = 0.021;        // [s]
 constexpr std::size_t kEnough = 1000;  // samples
-constexpr double kPartOfOff = 0.1;
+constexpr double kPartOfOff = 0.1;     // of what is off, see the header
 
 /// RMS of a signal of an axis less its moving mean while the axis has stood for a while.
 std::optional<double> at_rest(const Record& record, std::size_t axis,

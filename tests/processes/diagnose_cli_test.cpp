@@ -84,7 +84,7 @@ TEST_F(DiagnoseCli, TheTableItselfWithItsMapGivesTheSameVerdict) {
 }
 
 /// A record of one axis is not told what other axes cannot show.
-TEST_F(DiagnoseCli, OnlyAxesOfTheRecordAreCandidates) {
+TEST_F(DiagnoseCli, OnlyAxesOfTheRecordAreCandidatesAndARunIsNoReferenceOfItself) {
   std::string text = "t,told,is\n";
   for (int k = 0; k < 4000; ++k) {
     const double x = 10 * (1 - std::cos(kPi2 * k / 1000));
@@ -102,6 +102,13 @@ TEST_F(DiagnoseCli, OnlyAxesOfTheRecordAreCandidates) {
   const std::string json = read_text(scratch_ / "axis/diagnosis.json");
   EXPECT_NE(json.find("\"X.coulomb\""), std::string::npos);
   EXPECT_EQ(json.find("\"Y.coulomb\""), std::string::npos);
+
+  const Said itself =
+      vcnc("diagnose " + (scratch_ / "axis.csv") + " --reference " + (scratch_ / "axis.csv") +
+           " --suspect X.coulomb --map " + (scratch_ / "axis.toml"));
+  EXPECT_NE(itself.out.find("warning: The reference run holds the same values"), std::string::npos)
+      << itself.out << itself.err;
+  EXPECT_EQ(said.out.find("The reference run"), std::string::npos);
 }
 
 TEST_F(DiagnoseCli, RefusesWhatItCannotUseAndLeavesNothingBehind) {
