@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "analysis/compare.hpp"
 #include "analysis/whole_file.hpp"
 #include "apps/keep_memory.hpp"
 #include "apps/node_options.hpp"
@@ -69,6 +70,34 @@ void predict_tests(const DiagnoseOptions& options, const std::optional<HealthyRu
     const bool beside = healthy && same_program(record, healthy->record);
     append_figures(figures, record, beside ? &*healthy : nullptr, declared, found, test);
   }
+}
+
+/// What of `other`, a run beside `run`, is declared otherwise where it was measured; empty: nothing
+/// but where the piece lies.
+std::string other_machine(const Record& run, const Record& other) {
+  if (run.machine_toml.empty() || other.machine_toml.empty()) return "";
+  std::vector<KeyDifference> keys = differing_keys(run.machine_toml, other.machine_toml);
+  std::erase_if(
+      keys, [](const KeyDifference& k) { return k.key == "name" || k.key.starts_with("setup."); });
+  if (keys.empty()) return "";
+  const auto told = [](const std::string& value) { return value.empty() ? "not there" : value; };
+  return fmt::format(
+      "{} was measured on a machine that is declared otherwise than that of {}: {} is {}, was "
+      "{}{}.",
+      other.source, run.source, keys[0].key, told(keys[0].b), told(keys[0].a),
+      keys.size() > 1 ? fmt::format("; {} more keys differ", keys.size() - 1) : "");
+}
+
+/// Of the reference and of the test runs.
+void tell_other_machines(const DiagnoseOptions& options, const Record& run,
+                         const std::optional<HealthyRun>& healthy,
+                         std::vector<std::string>& warnings) {
+  std::vector<std::string> told;
+  if (healthy) told.push_back(other_machine(run, healthy->record));
+  for (const std::string& test : options.tests)
+    told.push_back(other_machine(run, load_record(test, options.map, options.model)));
+  for (std::string& sentence : told)
+    if (!sentence.empty()) warnings.push_back(std::move(sentence));
 }
 
 bool same_values(const Record& a, const Record& b) {
@@ -149,6 +178,7 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
   if (healthy && same_values(record, healthy->record))
     d.warnings.push_back(
         "The reference run holds the same values as the run itself: no difference can be found.");
+  tell_other_machines(options, record, healthy, d.warnings);
   const bool interrupted = stop_requested();  // the diagnosis says so itself
   predict_tests(options, healthy, d.declared, d.found, d.figures);
   if (stop_requested() && !interrupted)

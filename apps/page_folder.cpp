@@ -34,6 +34,10 @@ fs::path page_folder(const std::string& out, const std::string& name, std::strin
     throw InputError("--out " + out +
                      ": holds other files; it needs a new or empty folder, or one with an earlier "
                      "page of this kind");
+  const fs::path trial = folder / ".writable";
+  const bool writable = std::ofstream(trial).good();
+  fs::remove(trial, error);
+  if (!writable) throw InputError("--out " + out + ": nothing can be written there");
   return folder;
 }
 

@@ -115,7 +115,7 @@ void add_program_command(CLI::App& app) {
   add_rim_options(add_kind(*program, "s-piece", "one lap around the S-shaped test piece", a), a);
   add_rim_options(add_kind(*program, "cone", "one lap around a cone, five axes", a), a);
 
-  CLI::App* circle = add_kind(*program, "circle", "laps inside a ring gauge, or free", a);
+  CLI::App* circle = add_kind(*program, "circle", "laps inside a ring gauge", a);
   add_scan_options(circle, a);
   circle->add_option("--radius-mm", a->radius_mm, "radius of the path; default: from the ring")
       ->check(CLI::PositiveNumber);

@@ -155,9 +155,11 @@ struct ImportMap {
   };
 
   enum class Separator { any, comma, semicolon, tab, space };
+  enum class Decimal { point, comma };
 
   std::string machine;  ///< declared machine file
   Separator separator = Separator::any;
+  Decimal decimal = Decimal::point;
   std::vector<std::string> missing;  ///< texts that stand for "no value"
   bool detect_laps = true;
   std::string lap_column, condition_column;
@@ -177,6 +179,8 @@ struct ImportMap {
                   {"tab", Separator::tab},
                   {"space", Separator::space}},
                  "between the values of a text table; any: told from its first lines");
+    visit.choice("decimal", p.decimal, {{"point", Decimal::point}, {"comma", Decimal::comma}},
+                 "sign before the decimals of a text table; comma: 1,5 is one and a half");
     visit("missing", p.missing, "values that mean there is none, besides nothing and nan");
     visit("detect_laps", p.detect_laps,
           "look for repetitions of the same motion in the commands, where no laps are given");

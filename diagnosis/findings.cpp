@@ -662,7 +662,7 @@ class Report {
       const bool limited = is_limit(candidate.numbers.front());
       Excitation e{candidate.name(), limit, limited ? std::isfinite(limit) : limit < typical, ""};
       if (!e.excited) e.program = program_for(candidate.effect);
-      d_.excitation.push_back(std::move(e));
+      if (e.excited || !selection_.interrupted) d_.excitation.push_back(std::move(e));
     }
     for (std::size_t i = 0; i < selection_.release_limits.size(); ++i) {
       const FreeNumber& n = selection_.base.nuisances.numbers[i].number;

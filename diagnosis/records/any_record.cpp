@@ -37,7 +37,9 @@ Machine declared_machine(const std::string& model, const Record& record) {
         parse_machine(record.machine_toml, record.source).kinematics.type !=
             machine.kinematics.type)
       throw MeasurementError(record.source + ": was measured on a machine of another type than " +
-                             model + " (kinematics.type)");
+                             model +
+                             " (kinematics.type); if that is wrong, import the table with a map "
+                             "whose `machine` is of this type");
     return machine;
   }
   if (record.machine_toml.empty())

@@ -396,7 +396,8 @@ Record import_files(const std::string& table, const std::string& map, const std:
   std::optional<Machine> named, declared;
   if (!read.machine.empty()) named = load_machine(read.machine);
   declared = model.empty() ? named : load_machine(model);
-  const TextFormat format{.separator = read.separator, .missing = read.missing};
+  const TextFormat format{
+      .separator = read.separator, .decimal = read.decimal, .missing = read.missing};
   Record record =
       import_table(read_measured_table(table, format), read, map, declared ? &*declared : nullptr);
   if (named) {

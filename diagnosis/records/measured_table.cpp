@@ -51,13 +51,17 @@ std::optional<double> number(std::string_view text) {
   return value;
 }
 
+/// "1,5" as 1.5; a point, as between thousands, is none of it.
+std::optional<double> comma_number(std::string_view text) {
+  if (text.find('.') != text.npos) return std::nullopt;
+  std::string pointed(text);
+  if (const std::size_t comma = pointed.find(','); comma != pointed.npos) pointed[comma] = '.';
+  return number(pointed);
+}
+
 /// "1,5": a number, if the comma were a point.
 bool has_decimal_comma(std::string_view text) {
-  const std::size_t comma = text.find(',');
-  if (comma == text.npos || text.find(',', comma + 1) != text.npos) return false;
-  std::string pointed(text);
-  pointed[comma] = '.';
-  return number(pointed).has_value();
+  return text.find(',') != text.npos && comma_number(text).has_value();
 }
 
 class TextTable {
@@ -68,6 +72,10 @@ class TextTable {
   }
 
   MeasuredTable read() {
+    if (decimal_comma() && separator_ == Separator::comma)
+      throw MeasurementError(name_ +
+                             ": commas cannot both separate values and begin decimals; the map "
+                             "says so (separator, decimal)");
     if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
     if (text_.substr(0, 2) == "\xFF\xFE" || text_.substr(0, 2) == "\xFE\xFF")
       fail(1, "is UTF-16 text; save it as UTF-8 or ASCII");
@@ -89,7 +97,7 @@ class TextTable {
     if (line.find('\r') != line.npos)
       fail(line_, "lines end with a carriage return alone; end them with a line feed");
     const std::string_view content = trimmed(line);
-    if (content.empty()) return;
+    if (content.empty() || (line_ == 1 && tells_separator(content))) return;
     if (content.front() == '#' || content.front() == '%') {
       if (!begun_) remark_ = std::string(trimmed(content.substr(1)));
       return;
@@ -107,12 +115,20 @@ class TextTable {
       take_row();
   }
 
+  /// "sep=;" in front of all, from a spreadsheet.
+  bool tells_separator(std::string_view line) {
+    if (line.size() != 5 || !(line.starts_with("sep=") || line.starts_with("SEP="))) return false;
+    if (separator_ == Separator::any && line[4] == ',') separator_ = Separator::comma;
+    if (separator_ == Separator::any && line[4] == ';') separator_ = Separator::semicolon;
+    return true;
+  }
+
   static std::string_view trimmed_end(std::string_view line) {
     while (!line.empty() && (line.back() == '\r' || line.back() == '\0')) line.remove_suffix(1);
     return line;
   }
 
-  static Separator told_separator(std::string_view line) {
+  Separator told_separator(std::string_view line) const {
     std::array<std::size_t, 3> count{};
     bool quoted = false;
     for (const char c : line) {
@@ -125,8 +141,13 @@ class TextTable {
     // A decimal comma stands beside semicolons or tabs, never the other way round.
     if (count[0] > 0) return Separator::semicolon;
     if (count[1] > 0) return Separator::tab;
-    if (count[2] > 0) return Separator::comma;
+    if (count[2] > 0 && !decimal_comma()) return Separator::comma;
     return Separator::space;
+  }
+
+  bool decimal_comma() const { return format_.decimal == ImportMap::Decimal::comma; }
+  std::optional<double> number_of(std::string_view text) const {
+    return decimal_comma() ? comma_number(text) : number(text);
   }
 
   char separator_sign() const {
@@ -194,7 +215,7 @@ class TextTable {
   bool is_heading() const {
     bool text = false;
     for (const std::string& f : fields_) {
-      if (number(f)) return false;
+      if (number_of(f)) return false;
       text = text || (!missing(f) && !has_decimal_comma(f));
     }
     return text;
@@ -229,19 +250,19 @@ class TextTable {
       const bool commas = separator_ == Separator::comma && fields_.size() > expected;
       fail(line_,
            fmt::format("{} values, expected {}{}", fields_.size(), expected,
-                       commas ? "; if the numbers have decimal commas, export them with "
-                                "points"
+                       commas ? "; if the numbers have decimal commas, another sign must separate "
+                                "them: export the table with semicolons or points"
                        : table_.rows() == 0 ? "; remarks above the line of names need a # in front"
                                             : ""));
     }
     for (std::size_t i = 0; i < expected; ++i) {
       MeasuredColumn& column = table_.columns[i];
       const std::string& text = fields_[i];
-      const auto value = missing(text) ? std::optional(kMissing) : number(text);
+      const auto value = missing(text) ? std::optional(kMissing) : number_of(text);
       if (!value && has_decimal_comma(text))
         fail(line_,
-             fmt::format("\"{}\" in column \"{}\" has a decimal comma; export the table with "
-                         "decimal points",
+             fmt::format("\"{}\" in column \"{}\" has a decimal comma; if all numbers have, say so "
+                         "in the map: decimal = \"comma\"",
                          shortened(text), shortened(column.name)));
       if (!value && column.bad_line == 0) {
         column.bad_line = line_;

@@ -2,8 +2,9 @@
 // HDF5.
 //
 // Text: values between commas, semicolons, tabs or spaces, quoted or not; lines that begin with #
-// or % are remarks; the first other line may hold headings (or the last remark before it, as numpy
-// writes them), the second may hold units, which are not looked at. Numbers have a decimal point.
+// or % are remarks; a first line "sep=;", as spreadsheets write it, tells the separator; the first
+// other line may hold headings (or the last remark before it, as numpy writes them), the second may
+// hold units, which are not looked at. Numbers have a decimal point, or a comma where that is said.
 // An empty value, nan, NA, N/A or null is missing. A value that is no number makes its column
 // unusable, not the table: there may be columns of text beside the measured ones.
 // HDF5: see analysis/hdf5_columns.hpp.
@@ -45,7 +46,8 @@ struct MeasuredTable {
 
 struct TextFormat {
   ImportMap::Separator separator = ImportMap::Separator::any;
-  std::vector<std::string> missing;  ///< further values that mean there is none
+  ImportMap::Decimal decimal = ImportMap::Decimal::point;
+  std::vector<std::string> missing = {};  ///< further values that mean there is none
 };
 
 MeasuredTable parse_text_table(std::string_view text, const std::string& name,

@@ -29,6 +29,9 @@ constexpr std::size_t kOneIn = 1000;        // such bends are usual
 constexpr double kLone = 10;                // times what is usual
 constexpr double kMoves = 1e-4;             ///< [m or rad] of a command that every position shows
 constexpr std::size_t kFewestSteps = 500;
+constexpr double kCarries = 0.5;        ///< share of a twist that comes from what the load needs
+constexpr double kCarriesPart = 0.005;  ///< ... from its inertia, and from its friction
+constexpr double kFarAway = 3;          // times all that lies together
 
 struct Spread {
   double low = HUGE_VAL, high = -HUGE_VAL;
@@ -103,7 +106,7 @@ class Checker {
     check_values();
     for (const MeasuredSignal& v : velocities_) check_velocity(v);
     for (const MeasuredSignal& s : record_.signals) {
-      if (s.kind == SignalKind::position) check_command(s), check_twist(s);
+      if (s.kind == SignalKind::position) check_command(s), check_twist(s), check_sides(s);
       if (s.kind == SignalKind::position || s.kind == SignalKind::command) check_range(s);
     }
     for (const MeasuredSignal& s : record_.signals)
@@ -166,6 +169,27 @@ class Checker {
                     count == 1 ? "it was" : "they were"));
   }
 
+  /// Warns of one value that comes more than once, far off all others: it means there is none.
+  void check_filler(const MeasuredSignal& s) {
+    for (const double sign : {1.0, -1.0}) {
+      double least = HUGE_VAL, next = HUGE_VAL, most = -HUGE_VAL;
+      std::size_t count = 0;
+      for (const double value : s.value) {
+        const double v = sign * value;
+        if (!std::isfinite(v)) continue;
+        if (v < least) next = least, least = v, count = 0;
+        if (v > least) next = std::min(next, v);
+        count += v == least;
+        most = std::max(most, v);
+      }
+      if (count < 2 || !(most > next) || next - least < kFarAway * (most - next)) continue;
+      warn(
+          fmt::format("{}: {} values are {:.6g} (SI), far off all others; if they mean that there "
+                      "is none, say so by missing = [...] in the map",
+                      name(s), count, sign * least));
+    }
+  }
+
   void check_values() {
     std::size_t compared = 0, still = 0;
     for (MeasuredSignal& s : record_.signals) {
@@ -188,7 +212,8 @@ class Checker {
         warn(fmt::format("{} comes in {:.0f} coarse steps of {:.3g} (SI)", name(s), steps,
                          s.resolution));
       if (s.kind == SignalKind::force || s.kind == SignalKind::deflection || raw) check_ends(s);
-      if (!raw && s.kind != SignalKind::temperature && s.kind != SignalKind::clock) check_lone(s);
+      if (!raw && s.kind != SignalKind::temperature && s.kind != SignalKind::clock)
+        check_lone(s), check_filler(s);
     }
     if (compared == 0)
       refuse(
@@ -280,6 +305,30 @@ class Checker {
                                       "be unrolled before",
                                       jump, unit)
                         : "check scale (gear, lead), sign and unit of the two positions"));
+  }
+
+  /// A transmission gives way to what it carries, by which the load stays behind the motor.
+  void check_sides(const MeasuredSignal& s) {
+    const MeasuredSignal* twist = record_.find(SignalKind::twist, s.axis);
+    if (!twist || constant(twist->value) || constant(s.value)) return;
+    const MeasuredSignal* force = record_.find(SignalKind::force, s.axis);
+    if (force ? !is_pushed_ahead(*twist, *force) : !leads(*twist, s)) return;
+    warn(
+        fmt::format("{}: the load is ahead of the motor where the motor should pull it: are the "
+                    "columns of motor and load swapped, or is one of them late?",
+                    name(*twist)));
+  }
+
+  bool is_pushed_ahead(const MeasuredSignal& twist, const MeasuredSignal& force) const {
+    const Relation r = relate(smoothed(force.value, half_), smoothed(twist.value, half_));
+    return r.known && r.correlation > kBelongs;
+  }
+
+  /// Where the force is not known: with what inertia and friction of the load would need.
+  bool leads(const MeasuredSignal& twist, const MeasuredSignal& position) const {
+    const auto fit = fit_force(twist, position);
+    return fit && fit->explained > kCarries && fit->mass > 0 && fit->dry > 0 &&
+           std::min(fit->mass_explains, fit->dry_explains) > kCarriesPart;
   }
 
   /// From where on, and how far, a command goes while its position stays as it is.
@@ -409,9 +458,11 @@ class Checker {
     double mass = 0, viscous = 0, dry = 0;
     double explained = 0;      ///< share of the variance
     double mass_explains = 0;  ///< ... that is lost without the mass
+    double dry_explains = 0;   ///< ... that is lost without dry friction
   };
 
-  std::optional<ForceFit> fit_force(const MeasuredSignal& force, const MeasuredSignal& position) {
+  std::optional<ForceFit> fit_force(const MeasuredSignal& force,
+                                    const MeasuredSignal& position) const {
     const Series v = speed_of(position);
     const Series a = smoothed(slope_of(v, record_.period), half_);
     const Series f = smoothed(smoothed(force.value, half_), half_);
@@ -436,9 +487,16 @@ class Checker {
     if (n < 50 || !(variance > 1e-12 * square)) return std::nullopt;
     const Eigen::Vector4d x = normal.ldlt().solve(right);
     if (!x.allFinite()) return std::nullopt;
-    const Eigen::Vector3d without = normal.bottomRightCorner<3, 3>().ldlt().solve(right.tail<3>());
-    const double left = square - x.dot(right), left_without = square - without.dot(right.tail<3>());
-    return ForceFit{x[0], x[1], x[2], 1 - left / variance, (left_without - left) / variance};
+    const double left = square - x.dot(right);
+    const auto explains = [&](Eigen::Index column) {
+      Eigen::Matrix4d others = normal;
+      others.row(column).setZero(), others.col(column).setZero();
+      others(column, column) = 1;
+      Eigen::Vector4d b = right;
+      b[column] = 0;
+      return (square - others.ldlt().solve(b).dot(b) - left) / variance;
+    };
+    return ForceFit{x[0], x[1], x[2], 1 - left / variance, explains(0), explains(2)};
   }
 
   /// No drive gives five times what it can.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -20,6 +21,9 @@ namespace {
 
 /// Lengths of laps of one condition differ by their start within a sample.
 constexpr std::size_t kSlack = 3;
+/// Of two laps that are apart by more than this part of their way, or by more than this [m or rad]
+/// where there is none, one does another motion.
+constexpr double kOtherWay = 0.1, kNoWay = 1e-3;
 /// A reading is not told where it is off by more than this, of its roughness, and by more than
 /// this, of what it usually is: a model that is wrong by a little everywhere cancels.
 constexpr double kUntold = 20, kFarOff = 5;
@@ -47,6 +51,15 @@ double median_size(const std::vector<double>& series) {
   for (const double x : series)
     if (std::isfinite(x)) sizes.push_back(std::abs(x));
   return sizes.empty() ? 0 : median(std::move(sizes));
+}
+
+/// Standard deviation; 0 where there is nothing.
+double deviation(const std::vector<double>& values) {
+  const auto n = static_cast<double>(std::max<std::size_t>(values.size(), 1));
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
+  double sum = 0;
+  for (const double v : values) sum += (v - mean) * (v - mean);
+  return std::sqrt(sum / n);
 }
 
 /// RMS of what the healthy machine is off the healthy run where it is told, per channel.
@@ -96,12 +109,36 @@ Record without_outliers(Record record, const Replica& replica, const Machine& de
   return record;
 }
 
+/// Where an axis was told to be, else where it was; null: neither is known.
+const MeasuredSignal* way_of(const Record& record, std::size_t axis) {
+  const MeasuredSignal* told = record.find(SignalKind::command, axis);
+  return told ? told : record.find(SignalKind::position, axis);
+}
+
+/// Whether all axes go the same way in two laps of nearly the same length, wherever it begins.
+bool same_way(const Record& a, const Stretch& of_a, const Record& b, const Stretch& of_b) {
+  const std::size_t n = std::min(of_a.end - of_a.begin, of_b.end - of_b.begin);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const MeasuredSignal *way_a = way_of(a, axis), *way_b = way_of(b, axis);
+    if (!way_a || !way_b) continue;
+    std::vector<double> x, apart;
+    for (std::size_t k = 0; k < n; ++k) {
+      const double p = way_a->value[of_a.begin + k], q = way_b->value[of_b.begin + k];
+      if (std::isfinite(p) && std::isfinite(q)) x.push_back(p), apart.push_back(q - p);
+    }
+    if (deviation(apart) > kOtherWay * deviation(x) + kNoWay) return false;
+  }
+  return true;
+}
+
 /// Laps of a healthy run that do the same as a lap of another.
-std::vector<const Stretch*> partners(const Stretch& lap, const Record& healthy) {
+std::vector<const Stretch*> partners(const Record& now, const Stretch& lap, const Record& healthy) {
   std::vector<const Stretch*> laps;
   for (const Stretch& h : healthy.stretches) {
     const std::size_t a = h.end - h.begin, b = lap.end - lap.begin;
-    if (h.condition == lap.condition && (a > b ? a - b : b - a) <= kSlack) laps.push_back(&h);
+    if (h.condition == lap.condition && (a > b ? a - b : b - a) <= kSlack &&
+        same_way(now, lap, healthy, h))
+      laps.push_back(&h);
   }
   return laps;
 }
@@ -144,7 +181,7 @@ HealthyRun healthy_run(const Record& record, Replica& replica, const Machine& de
 
 bool same_program(const Record& now, const Record& healthy) {
   return std::none_of(now.stretches.begin(), now.stretches.end(),
-                      [&](const Stretch& s) { return partners(s, healthy).empty(); });
+                      [&](const Stretch& s) { return partners(now, s, healthy).empty(); });
 }
 
 DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
@@ -156,6 +193,10 @@ DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
                              "compared with a healthy run; give them in the map ([[laps]] or "
                              "lap_column)");
   check_same_kinematics(now, healthy.record);
+  if (std::all_of(now.stretches.begin(), now.stretches.end(),
+                  [&](const Stretch& s) { return partners(now, s, healthy.record).empty(); }))
+    throw MeasurementError(healthy.record.source + ": does none of the motions of " + now.source +
+                           "; a healthy run needs the same program");
   DifferentialRecord result{.record = now, .noise = healthy.noise, .healthy = healthy.machine};
   std::size_t fewest = 0, unmatched = 0;
   for (MeasuredSignal& signal : result.record.signals) {
@@ -169,7 +210,7 @@ DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
       const std::vector<double>& yhat =
           healthy.predicted[static_cast<std::size_t>(channel - healthy.channels.begin())];
       for (const Stretch& s : now.stretches) {
-        const std::vector<const Stretch*> laps = partners(s, healthy.record);
+        const std::vector<const Stretch*> laps = partners(now, s, healthy.record);
         unmatched += laps.empty();
         if (laps.empty()) continue;
         fewest = fewest == 0 ? laps.size() : std::min(fewest, laps.size());

@@ -698,6 +698,29 @@ TEST(LessHealthy, RefusesARunOfAMachineThatIsBuiltOtherwise) {
   EXPECT_THROW(less(), MeasurementError);
 }
 
+TEST(LessHealthy, RefusesARunThatDoesOtherMotionsOfTheSameLength) {
+  Record healthy = measured({}, 45), now = measured({}, 46);
+  toy::ToyReplica of_healthy(healthy);
+  const HealthyRun run = healthy_run(healthy, of_healthy, {});
+  EXPECT_NO_THROW(less_healthy(now, run));
+  EXPECT_TRUE(same_program(now, healthy));
+  for (MeasuredSignal& s : now.signals)
+    if (s.kind == SignalKind::command && s.axis == kX)
+      for (double& x : s.value) x += 0.5e-3;  // the same, elsewhere
+  EXPECT_TRUE(same_program(now, healthy));
+  for (MeasuredSignal& s : now.signals)
+    if (s.kind == SignalKind::command && s.axis == kX)
+      for (double& x : s.value) x *= 0.8;
+  EXPECT_FALSE(same_program(now, healthy));
+  try {
+    less_healthy(now, run);
+    FAIL();
+  } catch (const MeasurementError& e) {
+    EXPECT_NE(std::string(e.what()).find("a healthy run needs the same program"), std::string::npos)
+        << e.what();
+  }
+}
+
 TEST(LessHealthy, RefusesForcesThatOneRunKnowsAlone) {
   Record healthy = measured({}, 43), now = measured({}, 44);
   toy::ToyReplica of_healthy(healthy);

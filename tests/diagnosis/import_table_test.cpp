@@ -402,6 +402,39 @@ TEST(ImportTable, WarnsOfWhatIsOnlySuspicious) {
   EXPECT_TRUE(warned(swapped, "is ahead of \"pos\" (command X) by 4 ms")) << all_warnings(swapped);
 }
 
+/// A transmission that gives way leaves the load behind.
+TEST(ImportTable, MotorAndLoadThatAreSwappedAreSuspicious) {
+  Columns all = columns();
+  all["motor"] = [](double t) { return LinearAxis::position(t) + LinearAxis::force(t) / 2e7; };
+  all["scale"] = [](double t) { return (1 - 20e-6) * LinearAxis::position(t); };
+  all["force"] = [](double t) { return LinearAxis::force(t); };
+  const auto of = [&](const std::string& motor, const std::string& load, bool with_force = false) {
+    return imported(kTime + signal(motor, "motor_position", "X", "m") +
+                        signal(load, "load_position", "X", "m") +
+                        (with_force ? signal("force", "force", "X", "N") : ""),
+                    table_of(all));
+  };
+  const std::string words = "are the columns of motor and load swapped";
+  EXPECT_TRUE(warned(of("cmd", "motor"), words)) << all_warnings(of("cmd", "motor"));
+  EXPECT_FALSE(warned(of("motor", "cmd"), words)) << all_warnings(of("motor", "cmd"));
+  EXPECT_TRUE(warned(of("cmd", "motor", true), words)) << all_warnings(of("cmd", "motor", true));
+  EXPECT_FALSE(warned(of("motor", "cmd", true), words)) << all_warnings(of("motor", "cmd", true));
+  EXPECT_FALSE(warned(of("cmd", "scale"), words)) << all_warnings(of("cmd", "scale"));
+  EXPECT_FALSE(warned(of("scale", "cmd"), words)) << all_warnings(of("scale", "cmd"));
+}
+
+/// -9999 for "none" that the map does not know.
+TEST(ImportTable, ValuesThatFillGapsAreSuspicious) {
+  MeasuredTable table = table_of(columns());
+  for (MeasuredColumn& c : table.columns)
+    if (c.name == "force")
+      for (std::size_t k = 1000; k < 1010; ++k) c.value[k] = -999;
+  const Record filled = imported(sound_map(), table);
+  EXPECT_TRUE(warned(filled, "10 values are -999 (SI), far off all others"))
+      << all_warnings(filled);
+  EXPECT_FALSE(warned(imported(sound_map()), "far off all others"));
+}
+
 TEST(Resolution, IsTheStepOfQuantisedValuesAndNothingOfSmoothOnes) {
   std::vector<double> quantised, smooth;
   for (int k = 0; k < 3000; ++k) {

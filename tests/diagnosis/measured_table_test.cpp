@@ -42,9 +42,8 @@ TEST(MeasuredTable, WithoutHeadingsColumnsAreCalledByTheirNumbers) {
 }
 
 TEST(MeasuredTable, WhatIsMissingIsNaNAndWhatIsNoNumberIsRemembered) {
-  const MeasuredTable table =
-      parse_text_table("t,q,note\n0,,go\n1,nan,go\n2,-9999,\n3,4,go\n", "run.csv",
-                       {.separator = ImportMap::Separator::any, .missing = {"-9999"}});
+  const MeasuredTable table = parse_text_table("t,q,note\n0,,go\n1,nan,go\n2,-9999,\n3,4,go\n",
+                                               "run.csv", {.missing = {"-9999"}});
   ASSERT_EQ(table.rows(), 4u);
   for (const std::size_t k : {0u, 1u, 2u}) EXPECT_TRUE(std::isnan(table.columns[1].value[k])) << k;
   EXPECT_EQ(table.columns[1].value[3], 4);
@@ -53,8 +52,36 @@ TEST(MeasuredTable, WhatIsMissingIsNaNAndWhatIsNoNumberIsRemembered) {
   EXPECT_EQ(table.columns[2].bad_text, "go");
 }
 
+TEST(MeasuredTable, DecimalCommasAreReadWhereTheMapSaysSo) {
+  const TextFormat commas{.decimal = ImportMap::Decimal::comma};
+  for (const char* text : {"t;q\n0;-1,5\n1;2,5e-3\n", "sep=;\nt;q\ns;um\n0;-1,5\n1;2,5e-3\n",
+                           "t\tq\n0\t-1,5\n1\t2,5e-3\n", "t q\n0 -1,5\n1 2,5e-3\n"}) {
+    const MeasuredTable table = parse_text_table(text, "run.csv", commas);
+    ASSERT_EQ(table.columns.size(), 2u) << text;
+    ASSERT_EQ(table.rows(), 2u) << text;
+    EXPECT_EQ(table.columns[1].name, "q") << text;
+    EXPECT_EQ(table.columns[1].value[0], -1.5) << text;
+    EXPECT_EQ(table.columns[1].value[1], 2.5e-3) << text;
+  }
+  EXPECT_EQ(parse_text_table("t;q\n0;1.000,5\n1;2\n", "run.csv", commas).columns[1].bad_text,
+            "1.000,5");
+  EXPECT_THROW(parse_text_table("t,q\n0,1\n", "run.csv",
+                                {.separator = ImportMap::Separator::comma,
+                                 .decimal = ImportMap::Decimal::comma}),
+               MeasurementError);
+}
+
+TEST(MeasuredTable, ALineOfASpreadsheetTellsTheSeparator) {
+  const MeasuredTable table = parse_text_table("sep=;\nt;q, of X\n0;1\n1;2\n", "run.csv");
+  ASSERT_EQ(table.columns.size(), 2u);
+  EXPECT_EQ(table.columns[1].name, "q, of X");
+  EXPECT_EQ(table.line.front(), 3u);
+}
+
 TEST(MeasuredTable, RefusesWithLineAndReason) {
-  EXPECT_NE(refusal("t;q\n0;1,5\n").find("run.csv:2: \"1,5\" in column \"q\" has a decimal comma"),
+  EXPECT_NE(refusal("t;q\n0;1,5\n")
+                .find("run.csv:2: \"1,5\" in column \"q\" has a decimal comma; if all "
+                      "numbers have, say so in the map: decimal = \"comma\""),
             std::string::npos)
       << refusal("t;q\n0;1,5\n");
   EXPECT_NE(refusal("t,q\n0,0,1,5\n")

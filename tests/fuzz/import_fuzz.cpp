@@ -15,7 +15,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view rest = text.substr(std::min(at + kBetween.size(), text.size()));
   try {
     const ImportMap map = parse_import_map(text.substr(0, at), "map.toml");
-    const TextFormat format{.separator = map.separator, .missing = map.missing};
+    const TextFormat format{
+        .separator = map.separator, .decimal = map.decimal, .missing = map.missing};
     const MeasuredTable table = parse_text_table(rest, "table.csv", format);
     for (const MeasuredColumn& c : table.columns) fuzz::require(c.value.size() == table.rows());
     const Record record = import_table(table, map, "map.toml", &machine);

@@ -109,6 +109,23 @@ TEST_F(DiagnoseCli, OnlyAxesOfTheRecordAreCandidatesAndARunIsNoReferenceOfItself
   EXPECT_NE(itself.out.find("warning: The reference run holds the same values"), std::string::npos)
       << itself.out << itself.err;
   EXPECT_EQ(said.out.find("The reference run"), std::string::npos);
+  EXPECT_EQ(itself.out.find("declared otherwise"), std::string::npos);
+
+  // A test run of another machine.
+  write_text(scratch_ / "other.toml",
+             read_text(scratch_ / "machine.toml") + "\n[axes.Y]\nkv_per_s = 33\n");
+  std::string map = read_text(scratch_ / "axis.toml");
+  write_text(scratch_ / "other_map.toml", map.replace(map.find("machine.toml"), 12, "other.toml"));
+  ASSERT_EQ(vcnc("import " + (scratch_ / "axis.csv") + " --map " + (scratch_ / "other_map.toml") +
+                 " --out " + (scratch_ / "other.h5"))
+                .code,
+            0);
+  const Said other =
+      vcnc("diagnose " + (scratch_ / "axis.csv") + " --test " + (scratch_ / "other.h5") +
+           " --suspect X.coulomb --map " + (scratch_ / "axis.toml"));
+  EXPECT_NE(other.out.find("is declared otherwise than that of"), std::string::npos)
+      << other.out << other.err;
+  EXPECT_NE(other.out.find("axes.Y.kv_per_s is 33"), std::string::npos) << other.out;
 }
 
 TEST_F(DiagnoseCli, RefusesWhatItCannotUseAndLeavesNothingBehind) {
