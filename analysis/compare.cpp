@@ -32,8 +32,14 @@ std::vector<std::pair<std::string, std::string>> keys_of(const std::string& toml
   std::vector<std::pair<std::string, std::string>> keys;
   std::istringstream in(toml);
   std::string line, table;
+  std::map<std::string, int> listed;  // how many of a [[table]] there were
   while (std::getline(in, line)) {
     if (line.empty() || line.front() == '#') continue;
+    if (line.starts_with("[[")) {
+      const std::string name = line.substr(2, line.size() - 4);
+      table = fmt::format("{}[{}].", name, listed[name]++);
+      continue;
+    }
     if (line.front() == '[') {
       table = line.substr(1, line.size() - 2) + ".";
       continue;

@@ -282,7 +282,8 @@ Verdict friction(Work& w, std::size_t axis) {
   constexpr double kLeastFeedForward = 0.5;
   if (declared.servo.velocity_ff < kLeastFeedForward)
     return no("the pulse goes through the velocity feed-forward, which the drive does not use");
-  const double dry = dry_friction(w, axis), inertia = declared.mechanics.total_inertia();
+  const double dry = dry_friction(w, axis) + w.effects(axis).get<MotorFriction>().level,
+               inertia = declared.mechanics.total_inertia();
   if (dry == 0) return no("makes no dry friction at a usual speed");
   if (const double stiffness = w.effects(axis).get<Presliding>().stiffness; stiffness > 0)
     return no(fmt::format("it turns over a way of {}; a pulse at the reversal would come too early",
@@ -328,6 +329,7 @@ constexpr Answer kAnswers[]{
     {"kv_error", lead},
     {"coulomb", friction},
     {"stribeck", friction},
+    {"motor_friction", friction},
 };
 
 /// Why an effect without an answer has none.

@@ -17,7 +17,7 @@
 //   command_delay, bus_latency, velocity_ff_error, kv_error, gains of the drives as they are:
 //       lead, so that all axes have one lag L:  l = t_d + n T + (1 - kvff)/Kv - L;  L = 0 where
 //       the longest lead of 5 ms allows it
-//   coulomb, stribeck                          a pulse at reversals
+//   coulomb, stribeck, motor_friction          a pulse at reversals
 //
 //   laws (model/effects/law.hpp) of the points displacement and command over a position, with the
 //   factor one or the sign of that axis' motion: a table of their knots

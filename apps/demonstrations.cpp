@@ -60,6 +60,9 @@ void dragging(Machine& m, std::size_t axis) {
 void motor_encoder(Machine& m, std::size_t axis) {
   m.axes[axis].servo.feedback = ServoParams::Feedback::motor;
 }
+void springy(Machine& m, std::size_t axis) {
+  m.effects.axis[axis].get<Windup>() = Windup::nominal(is_rotary(axis));
+}
 void sliding(Machine& m, std::size_t axis) {
   m.effects.axis[axis].get<Coulomb>() = Coulomb::nominal(is_rotary(axis));
 }
@@ -125,6 +128,7 @@ const std::vector<Peculiarity>& peculiarities() {
       {.effect = "transmission_error",
        .prepare = motor_encoder,
        .prepared = "measuring system on the motor"},
+      {.effect = "motor_friction", .prepare = springy, .prepared = "a transmission that gives way"},
       {.effect = "weight_imbalance", .axis = kZ},
       {.effect = "lost_motion", .prepare = sliding, .prepared = "Coulomb friction"},
       {.effect = "viscous",

@@ -88,6 +88,10 @@ bool can_be(const EffectPlace& place, const Machine& declared) {
     const MechanicsParams& m = declared.axes[place.axis].mechanics;
     return m.reflected_inertia() > kLeastMotorShare * m.load;
   }
+  if constexpr (std::is_same_v<Effect, MotorFriction>) {
+    const AxisEffects& e = declared.effects.axis[place.axis];
+    return !(e.get<Windup>().null() && e.get<Backlash>().null());  // else it is that of the load
+  }
   return true;
 }
 

@@ -55,6 +55,29 @@ void sort_by_worth(std::vector<Contender>& all) {
 
 }  // namespace
 
+std::vector<Screened> by_what_counts(std::vector<Screened> all) {
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Screened& x, const Screened& y) { return x.counted > y.counted; });
+  return all;
+}
+
+std::vector<Screened> worth_a_refit(const std::vector<Screened>& screened,
+                                    const DiagnosisOptions& options,
+                                    const std::function<Family(const Screened&)>& family_of) {
+  std::vector<Screened> list;
+  std::map<Family, std::size_t> of_family;
+  for (const Screened& s : screened) {
+    if (s.counted < kPromise * options.least_gain) break;
+    const Family family = family_of(s);
+    const bool first = list.size() < options.refits;
+    if (!first && (of_family[family] >= options.per_family || s.counted < 0.1 * list[0].counted))
+      continue;
+    ++of_family[family];
+    list.push_back(s);
+  }
+  return list;
+}
+
 double ContestRules::excess(double held_out) const { return std::max(0.0, held_out - floor); }
 
 double ContestRules::threshold(double held_out) const {
@@ -97,8 +120,11 @@ Contest::Contest(const ContestRules& rules, const FittedMachine& now)
 std::vector<Contender> Contest::contenders() {
   const std::vector<Screened> all_trials = screen(rules_.evidence, ground_, doubt_,
                                                   rules_.candidates, rules_.trials),
-                              all_screened = best_of_each(all_trials),
-                              list = shortlist(all_screened);
+                              all_screened = by_what_counts(best_of_each(all_trials)),
+                              list = worth_a_refit(
+                                  all_screened, rules_.options, [&](const Screened&of) {
+                                    return rules_.candidates[candidate_of(of)].family;
+                                  });
   std::vector<Contender> all = refitted(list);
   finish(all);
   if (const std::vector<Screened> more = likes_of(all, all_screened, list); !more.empty()) {
@@ -181,22 +207,6 @@ std::vector<Screened> Contest::best_of_each(const std::vector<Screened>& trials)
   return best;
 }
 
-/// Screened candidates worth a refit.
-std::vector<Screened> Contest::shortlist(const std::vector<Screened>& screened) const {
-  std::vector<Screened> list;
-  std::map<Family, std::size_t> of_family;
-  for (const Screened& s : screened) {
-    if (s.counted < kPromise * rules_.options.least_gain) continue;
-    const Family family = rules_.candidates[candidate_of(s)].family;
-    const bool first = list.size() < rules_.options.refits;
-    if (!first && (of_family[family] >= rules_.options.per_family || s.gain < 0.1 * list[0].gain))
-      continue;
-    ++of_family[family];
-    list.push_back(s);
-  }
-  return list;
-}
-
 std::vector<Contender> Contest::refitted(const std::vector<Screened>& list) const {
   std::vector<Contender> all(list.size());
   std::atomic<std::size_t> done = 0;
@@ -227,8 +237,8 @@ std::vector<Screened> Contest::likes_of(const std::vector<Contender>& all,
   const double best = all.front().gain;
   if (best < rules_.threshold(ground_.held_out)) return more;
   for (const Screened& s : screened) {
-    if (more.size() == kMoreRefits || s.gain < std::min(best - 2 * band_of(best), kNearly * best))
-      break;
+    if (more.size() == kMoreRefits) break;
+    if (s.gain < std::min(best - 2 * band_of(best), kNearly * best)) continue;
     if (std::none_of(list.begin(), list.end(),
                      [&](const Screened& l) { return l.trial == s.trial; }))
       more.push_back(s);

@@ -33,6 +33,15 @@ struct Contender {
   double worth() const { return counts - 4 * static_cast<double>(numbers.size()); }
 };
 
+/// Those that count most first: what the form of the model may make does not count, however much it
+/// is (counted_gain.hpp).
+std::vector<Screened> by_what_counts(std::vector<Screened> screened);
+
+/// Of candidates, by what counts, those worth a refit: the first ones, and of every family a few.
+std::vector<Screened> worth_a_refit(const std::vector<Screened>& screened,
+                                    const DiagnosisOptions& options,
+                                    const std::function<Family(const Screened&)>& family_of);
+
 /// What every contest of a diagnosis has in common.
 struct ContestRules {
   const Evidence& evidence;
@@ -84,7 +93,6 @@ class Contest {
 
  private:
   std::vector<Screened> best_of_each(const std::vector<Screened>& trials) const;
-  std::vector<Screened> shortlist(const std::vector<Screened>& screened) const;
   std::vector<Screened> likes_of(const std::vector<Contender>& all,
                                  const std::vector<Screened>& screened,
                                  const std::vector<Screened>& list) const;

@@ -130,6 +130,8 @@ AxisDriveOf<Real>::AxisDriveOf(std::vector<AxisDriveOf<double>> drives)
       force_limit_(drives[0].force_limit_),
       two_masses_(drives[0].two_masses_),
       uneven_(std::any_of(drives.begin(), drives.end(), [](const auto& d) { return d.uneven_; })),
+      motor_rubs_(
+          std::any_of(drives.begin(), drives.end(), [](const auto& d) { return d.motor_rubs_; })),
       laws_(drives[0].laws_) {
   for (std::size_t i = 0; i < kLanesOf<Real>; ++i) {
     AxisDriveOf<double>& drive = drives[std::min(i, drives.size() - 1)];
@@ -167,6 +169,9 @@ void AxisDriveOf<Real>::couple(const TransmissionPort::Signal<double>& transmiss
     wave_number_ = 2 * kPi / transmission.wave_period;
     wave_phase_ = transmission.wave_phase;
   }
+  motor_rubs_ = transmission.motor_dry > 0 || transmission.motor_viscous > 0;
+  motor_dry_ = transmission.motor_dry;
+  motor_viscous_ = transmission.motor_viscous;
   if (!(transmission.compliance > 0 || transmission.gap > 0)) return;
   two_masses_ = true;
   half_gap_ = 0.5 * transmission.gap;
@@ -450,7 +455,8 @@ void AxisDriveOf<Real>::move_plant() {
 /// Velocity after friction has acted for one plant step.
 template <class Real>
 Real AxisDriveOf<Real>::rub(Real v, Real v_free, Real inertia) {
-  if (!rubbing_.some_active()) return v_free;
+  const bool one_mass = motor_rubs_ && !two_masses_;
+  if (!rubbing_.some_active() && !one_mass) return v_free;
   FrictionPort::Signal<Real> terms;
   rubbing_.each_active([&](Chain<FrictionPort>& chain, std::size_t i) {
     FrictionTerms signal;
@@ -462,7 +468,17 @@ Real AxisDriveOf<Real>::rub(Real v, Real v_free, Real inertia) {
     set_lane(terms.stiffness, i, signal.stiffness);
     set_lane(terms.damping, i, signal.damping);
   });
+  if (one_mass) terms.dry += motor_dry_, terms.viscous += motor_viscous_;
   return friction_.step(terms, v, v_free, kPlantTime, inertia);
+}
+
+template <class Real>
+Real AxisDriveOf<Real>::rub_motor(Real v_free) {
+  if (!motor_rubs_) return v_free;
+  FrictionPort::Signal<Real> terms;
+  terms.dry = motor_dry_;
+  terms.viscous = motor_viscous_;
+  return motor_friction_.step(terms, v_motor_, v_free, kPlantTime, motor_inertia_);
 }
 
 template <class Real>
@@ -483,7 +499,7 @@ void AxisDriveOf<Real>::move_two_masses(Real force, Real load_force) {
     spring = choose(
         taut, stiffness_ * (twist - copysign(half_gap_, twist)) + damping_ * (v_motor_ - v_load_),
         Real(0));
-  v_motor_ += kPlantTime * (force - spring) / motor_inertia_;
+  v_motor_ = rub_motor(v_motor_ + kPlantTime * (force - spring) / motor_inertia_);
   v_load_ =
       rub(v_load_, v_load_ + kPlantTime * (spring + load_force) / load_inertia_, load_inertia_);
   x_motor_ += kPlantTime * v_motor_;

@@ -29,6 +29,8 @@
 //                F_s = K g(x_m - x) + D (x_m' - x')
 //                g(z) = z -+ b/2 outside the gap b, 0 inside (D off inside)
 //   backlash without compliance: the same, the sides of the gap as stiff as K may be
+//   friction on the motor's side, F_fm: m_r x_m'' = F - F_s - F_fm; of a rigid axis it is friction
+//                of the one mass
 //   uneven transmission: the motor is at x_m - u, u = A sin(k x_m + psi), which its measuring
 //   system
 //                counts, and its inertia follows: m_r (x_m - u)'' in place of m_r x_m''; of a rigid
@@ -245,6 +247,7 @@ class AxisDriveOf {
   void move_rigid(Real force, Real load_force);
   void move_two_masses(Real force, Real load_force);
   Real rub(Real v, Real v_free, Real inertia);
+  Real rub_motor(Real v_free);
   Real displaced(Real velocity_before);
   /// How far the load is ahead of the motor by an uneven transmission, and what force the motor's
   /// inertia adds when it is moved by that.
@@ -272,6 +275,8 @@ class AxisDriveOf {
   Real stiffness_{}, damping_{}, half_gap_{};
   bool uneven_ = false;
   Real wave_{}, wave_number_{}, wave_phase_{};  ///< of an uneven transmission
+  bool motor_rubs_ = false;
+  Real motor_dry_{}, motor_viscous_{};
 
   // Effects.
   Chains<ReceptionPort> reception_;
@@ -298,7 +303,7 @@ class AxisDriveOf {
   bool force_known_ = false;  ///< tell_force() was called
   KnownForce force_told_, force_before_;
   PerLane<Real, Motions<double>> motions_{};
-  FrictionOf<Real> friction_;
+  FrictionOf<Real> friction_, motor_friction_;
   VelocityObserverOf<Real> observer_;
   std::vector<SampledController> sampled_;  ///< one per lane, in place of the cascade, or none
 
@@ -308,8 +313,9 @@ class AxisDriveOf {
                  load_inertia_, servo_.kv, servo_.velocity_gain, servo_.integral_time,
                  servo_.velocity_ff, servo_.acceleration_ff, servo_.current_lag, servo_.force_limit,
                  kp_, lag_share_, position_share_, velocity_share_, stiffness_, damping_, half_gap_,
-                 wave_, wave_number_, wave_phase_, x_load_, x_motor_, last_raw_.position,
-                 last_raw_.velocity, last_shaped_.position, last_shaped_.velocity),
+                 wave_, wave_number_, wave_phase_, motor_dry_, motor_viscous_, x_load_, x_motor_,
+                 last_raw_.position, last_raw_.velocity, last_shaped_.position,
+                 last_shaped_.velocity),
         observer_.numbers());
   }
 };

@@ -46,6 +46,7 @@
 #include "model/effects/load_play.hpp"
 #include "model/effects/lost_motion.hpp"
 #include "model/effects/mains_hum.hpp"
+#include "model/effects/motor_friction.hpp"
 #include "model/effects/nonlinear_viscous.hpp"
 #include "model/effects/path_filter.hpp"
 #include "model/effects/period_slip.hpp"
@@ -105,7 +106,7 @@ using AllEffects = EffectList<
     // force of the motor
     TorqueConstantError, TorqueRipple, Cogging,
     // transmission
-    Windup, Backlash, TransmissionError,
+    Windup, Backlash, TransmissionError, MotorFriction,
     // friction: terms first, then what changes them
     Coulomb, Stribeck, GreaseDrag, Viscous, NonlinearViscous, Presliding, FrictionAsymmetry,
     FrictionZone, FrictionFade,

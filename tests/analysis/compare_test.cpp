@@ -87,6 +87,14 @@ TEST(Compare, KeysThatOnlyOneHas) {
   EXPECT_EQ(keys[1].b, "2.0");
 }
 
+TEST(Compare, KeysOfListsAreComparedOneByOne) {
+  const std::string text = "[[list]]\nkey = 1\n[[list]]\nkey = 2\n";
+  EXPECT_TRUE(differing_keys(text, text).empty());
+  const auto keys = differing_keys(text, "[[list]]\nkey = 1\n[[list]]\nkey = 3\n");
+  ASSERT_EQ(keys.size(), 1u);
+  EXPECT_EQ(keys[0].key, "list[1].key");
+}
+
 TEST(Compare, OtherHeightsOfTheScanLineAreSaid) {
   const Scratch dir;
   const Comparison c = compare(lap(dir, "a", 1e-6), lap(dir, "b", 1e-6, 25e-3));

@@ -169,6 +169,8 @@ struct PortSamples<TransmissionPort> {
     f(s.wave, within(1e-6, 1));
     f(s.wave_period, positive(1e-3, 1, 1e6));
     f(s.wave_phase, within(3, 10));
+    f(s.motor_dry, positive(0, rotary ? 10 : 500, 1e9));
+    f(s.motor_viscous, positive(0, rotary ? 10 : 5000, 1e9));
   }
   template <class C, class F>
   static void context(C&, F&&, bool) {}

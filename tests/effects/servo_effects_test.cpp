@@ -393,6 +393,51 @@ TEST(TransmissionError, MovesTheLoadIfTheLoopIsClosedOnTheMotor) {
              });
 }
 
+/// Of two masses at constant speed: the force of the drive, and the twist that it winds up.
+std::pair<double, double> drawn(const AxisEffects& effects, double v) {
+  AxisDrive drive(axis(), effects);
+  AxisCycle cycle;
+  double force = 0, twist = 0;
+  for (int k = 1; k <= 2000; ++k) {
+    cycle = drive.follow({v * kCycle * k, v});
+    if (k > 1000) force += cycle.force / 1000, twist += cycle.second / 1000;
+  }
+  return {force * axis().mechanics.force_limit, twist};
+}
+
+TEST(MotorFriction, TakesForceThatTheTransmissionDoesNotCarry) {
+  const double level = 100, viscous = 500, compliance = 10e-9;
+  for (const double v : {0.05, -0.1}) {
+    AxisEffects effects;
+    effects.get<Windup>().compliance = compliance;
+    AxisEffects of_load = effects;
+    effects.get<MotorFriction>() = {level, viscous};
+    of_load.get<Coulomb>().level = level;
+    of_load.get<Viscous>().coefficient = viscous;
+    const double expected = std::copysign(level, v) + viscous * v;
+    const auto [force, twist] = drawn(effects, v);
+    EXPECT_NEAR(force, expected, 1e-3 * level);
+    EXPECT_NEAR(twist, 0, 0.001 * kNm);
+    const auto [load_force, load_twist] = drawn(of_load, v);
+    EXPECT_NEAR(load_force, expected, 1e-3 * level);
+    EXPECT_NEAR(load_twist, -compliance * expected, 0.001 * kNm);
+  }
+}
+
+TEST(MotorFriction, OfOneMassIsThatOfTheLoad) {
+  AxisEffects of_load;
+  of_load.get<Coulomb>().level = 100;
+  of_load.get<Viscous>().coefficient = 500;
+  AxisDrive motor(axis(), only(MotorFriction{100, 500})), load(axis(), of_load);
+  for (int k = 1; k <= 2000; ++k) {
+    const double w = 2 * kPi, t = kCycle * k;
+    const AxisSetpoint target{0.01 * std::sin(w * t), 0.01 * w * std::cos(w * t)};
+    const AxisCycle a = motor.follow(target), b = load.follow(target);
+    ASSERT_EQ(a.truth, b.truth) << k;
+    ASSERT_EQ(a.force, b.force) << k;
+  }
+}
+
 TEST(LoadEncoderError, MovesTheLoadIfTheLoopIsClosedOnIt) {
   const LoadEncoderError effect{.amplitude = 1 * kUm, .period = 20e-3, .phase = 1.1};
   const double within = 5e-3 * effect.amplitude;

@@ -108,6 +108,11 @@ ExperimentOptions along_y() {
   return o;
 }
 
+/// 400 N of dry friction of X.
+Case rubbing(const char* name, std::function<void(Machine&)> inject) {
+  return {name, std::move(inject), Showing::circle, kX, {}, max_abs, 2.95 * kUm, 0.05, 0.1, 1.8};
+}
+
 constexpr double kHalfGap = 12 * kUm / 2;  ///< half a gap
 const double kRms = std::sqrt(0.5);        ///< of |cos| on a circle
 
@@ -188,16 +193,8 @@ INSTANTIATE_TEST_SUITE_P(
              0.1,
              0.35,
              1.9},
-        Case{"friction",
-             [](Machine& m) { of<Coulomb>(m, kX).level = 400; },
-             Showing::circle,
-             kX,
-             {},
-             max_abs,
-             2.95 * kUm,
-             0.05,
-             0.1,
-             1.8},
+        rubbing("friction", [](Machine& m) { of<Coulomb>(m, kX).level = 400; }),
+        rubbing("motor_friction", [](Machine& m) { of<MotorFriction>(m, kX).level = 400; }),
         Case{"command_delay",
              [](Machine& m) { of<CommandDelay>(m, kX).delay = 0.4e-3; },
              Showing::circle,

@@ -247,6 +247,10 @@ const std::map<std::string, Check>& checks() {
          EXPECT_GT(std::abs(spike_at(s.off.front(), 0).value()), 0.5 * kUm);
          EXPECT_LT(std::abs(spike_at(s.off.front(), kPi / 2).value()), 0.1 * kUm);
        }},
+      {"motor_friction",
+       [](const Shown& s) {  // the force turns over by 2 Fc and the load does not feel it
+         near(step_at(s.changes_of(Quantity::force).front(), 0).value(), -200, 0.08);
+       }},
       {"stribeck",
        [](const Shown& s) {  // only slowly: gone where X is fast, there at its reversals
          double fast = 0, slow = 0;

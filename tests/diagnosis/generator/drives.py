@@ -30,6 +30,7 @@ NAMES = {
     "load": 1.0, "motor": 1.0, "stiffness": 0.0, "damping": 0.0, "gap": 0.0,
     "coulomb": 0.0, "stribeck": 0.0, "stribeck_velocity": 1.0, "viscous": 0.0, "bristle": 1.0,
     "asymmetry_dry": 0.0, "asymmetry_viscous": 0.0,
+    "motor_coulomb": 0.0, "motor_viscous": 0.0, "motor_yield": 1e-6,
     "cogging": 0.0, "cogging_wave": 0.0, "cogging_phase": 0.0,
     "ripple": 0.0, "ripple_share": 0.0, "ripple_wave": 0.0, "ripple_phase": 0.0,
     "constant_force": 0.0, "turning_force": 0.0, "turning_angle": 0.0,
@@ -118,6 +119,8 @@ def simulate(commands, drives, seed):
     has_spring = bool(np.any(d.spring_1 != 0) or np.any(d.spring_3 != 0))
     has_turning = bool(np.any(d.turning_force != 0))
     has_encoder = bool(np.any(d.encoder_amplitude != 0))
+    has_motor_friction = bool(np.any(d.motor_coulomb != 0) or np.any(d.motor_viscous != 0))
+    motor_slope = hp * d.motor_coulomb / d.motor_yield
     inertia_ff = d.inertia_ff * d.acceleration_ff
     inverse_ti = h / d.ti
     inverse_vs = -1 / d.stribeck_velocity
@@ -141,6 +144,7 @@ def simulate(commands, drives, seed):
     v_load = np.zeros((5, runs))
     v_motor = np.zeros((5, runs))
     elements = np.zeros((4, 5, runs))
+    motor_element = np.zeros((5, runs))  # one that yields, in front of the transmission
     integral = np.zeros((5, runs))
     force_1 = np.zeros((5, runs))
     force = np.zeros((5, runs))
@@ -232,6 +236,10 @@ def simulate(commands, drives, seed):
                 net += spring
                 net *= step_load
                 v_load += net
+                if has_motor_friction:
+                    motor_element += motor_slope * v_motor
+                    np.clip(motor_element, -d.motor_coulomb, d.motor_coulomb, out=motor_element)
+                    spring += motor_element + d.motor_viscous * v_motor
                 np.subtract(acting, spring, out=spring)
                 spring *= step_motor
                 v_motor += spring

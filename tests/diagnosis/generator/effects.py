@@ -179,6 +179,12 @@ def viscous(m, axis, p):
     m.scale("viscous", axis, 1 + p["share_percent"] / 100)
 
 
+@effect(LINEAR, level_N=60, viscous_Ns_per_m=fixed(0.0))
+def motor_friction(m, axis, p):
+    m.axis["motor_coulomb"][axis] = p["level_N"]
+    m.axis["motor_viscous"][axis] = p["viscous_Ns_per_m"]
+
+
 @effect(LINEAR, share_percent=signed(8))
 def load_mass(m, axis, p):
     m.scale("load", axis, 1 + p["share_percent"] / 100)

@@ -108,6 +108,17 @@ class Drives(unittest.TestCase):
         twist = drives.simulate(commands, d, 1)["twist"][:, 0, 0].astype(float)
         self.assertAlmostEqual(twist[2000] - twist[1000], 10e-6 + 2 * 20 / 1e8, delta=0.05e-6)
 
+    def test_friction_of_the_motor_does_not_wind_up_the_transmission(self):
+        level, stiffness = 50.0, 1e8
+        d = bare(3, stiffness=stiffness, damping=5e3, bristle=1e8, motor_feedback=1.0)
+        d.motor_coulomb[:, 1] = level
+        d.coulomb[:, 2] = level
+        s = drives.simulate(ramp(2000, 0.1), d, 1)
+        for run, wound in ((1, 0.0), (2, level / stiffness)):
+            more = {k: (s[k][-500:, 0, run] - s[k][-500:, 0, 0]).mean() for k in ("force", "twist")}
+            self.assertAlmostEqual(more["force"], level, delta=0.01 * level)
+            self.assertAlmostEqual(-more["twist"], wound, delta=0.01 * level / stiffness)
+
     def test_error_of_one_measuring_system(self):
         """Both show between the systems; the load moves where its own is in error and closes the loop, by Kv/(s + Kv)."""
         v, period = 0.02, 0.02
