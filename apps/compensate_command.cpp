@@ -16,6 +16,8 @@
 namespace vcnc {
 namespace {
 
+constexpr double kLarger = 1.1;  ///< times what it was: told
+
 void print(const std::vector<CompensationRemark>& remarks) {
   if (remarks.empty()) std::cout << "The machine has no effects; nothing is compensated.\n";
   for (const bool compensated : {true, false}) {
@@ -35,6 +37,15 @@ void print(const std::vector<PassComparison>& passes) {
     std::cout << fmt::format("{:<22}{:>10.2f}{:>12.2f}{:>12.2f}{:>12.2f}\n",
                              p.motion + ", " + p.pass, p.before.rms * 1e6, p.after.rms * 1e6,
                              p.before.largest * 1e6, p.after.largest * 1e6);
+  for (const PassComparison& p : passes) {
+    const std::string pass = p.motion + ", " + p.pass;
+    if (p.after.rms > p.before.rms)
+      std::cout << "warning: " << pass << ": the settings make it worse; a load that no friction "
+                << "holds may be anywhere in its gap\n";
+    else if (p.after.largest > kLarger * p.before.largest)
+      std::cout << "note: " << pass << ": the largest error grows, a spike while a gap is crossed; "
+                << "a shorter transition_ms leaves a smaller one\n";
+  }
 }
 
 }  // namespace

@@ -227,6 +227,25 @@ TEST_F(DiagnoseCli, RunsAreComparedLessTheHealthyOneOfTheirProgram) {
   EXPECT_GT(off(longer, less + tests), 300);  // of another program: as it is
 }
 
+/// A gap that nothing holds is no better for being compensated, and of one that is held a spike is
+/// left.
+TEST_F(DiagnoseCli, CompensationSaysWhereItDoesHarm) {
+  const auto measured = [&](const std::string& changes) {
+    return vcnc("compensate " + std::string(VCNC_SOURCE_DIR) + "/configs/machines/trunnion.toml " +
+                changes + " --measure")
+        .out;
+  };
+  const std::string loose = measured("--set axes.X.feedback=motor --inject X.backlash.gap_um=6");
+  EXPECT_NE(loose.find("warning: circle, CCW: the settings make it worse"), std::string::npos)
+      << loose;
+  const std::string held = measured("--inject Y.load_play.width_um=3");
+  EXPECT_EQ(held.find("worse"), std::string::npos) << held;
+  EXPECT_NE(held.find("note: circle, CCW: the largest error grows"), std::string::npos) << held;
+  const std::string good = measured("--inject X.coulomb.level_N=200");
+  EXPECT_EQ(good.find("note:"), std::string::npos) << good;
+  EXPECT_EQ(good.find("warning:"), std::string::npos) << good;
+}
+
 TEST_F(DiagnoseCli, TheMapHasItsReference) {
   const Said said = vcnc("import --keys");
   EXPECT_EQ(said.code, 0);
