@@ -88,16 +88,8 @@ std::string other_machine(const Record& run, const Record& other) {
       keys.size() > 1 ? fmt::format("; {} more keys differ", keys.size() - 1) : "");
 }
 
-/// Of the reference and of the test runs.
-void tell_other_machines(const DiagnoseOptions& options, const Record& run,
-                         const std::optional<HealthyRun>& healthy,
-                         std::vector<std::string>& warnings) {
-  std::vector<std::string> told;
-  if (healthy) told.push_back(other_machine(run, healthy->record));
-  for (const std::string& test : options.tests)
-    told.push_back(other_machine(run, load_record(test, options.map, options.model)));
-  for (std::string& sentence : told)
-    if (!sentence.empty()) warnings.push_back(std::move(sentence));
+void append_told(std::string sentence, std::vector<std::string>& warnings) {
+  if (!sentence.empty()) warnings.push_back(std::move(sentence));
 }
 
 bool same_values(const Record& a, const Record& b) {
@@ -178,7 +170,7 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
   if (healthy && same_values(record, healthy->record))
     d.warnings.push_back(
         "The reference run holds the same values as the run itself: no difference can be found.");
-  tell_other_machines(options, record, healthy, d.warnings);
+  if (healthy) append_told(other_machine(record, healthy->record), d.warnings);
   const bool interrupted = stop_requested();  // the diagnosis says so itself
   predict_tests(options, healthy, d.declared, d.found, d.figures);
   if (stop_requested() && !interrupted)
@@ -211,18 +203,21 @@ int diagnose_command(const DiagnoseOptions& options) {
         "--reference, --test, --suspect, --without: are for machines, not for the signals of an "
         "encoder");
   // What cannot be predicted is refused before anything is sought.
+  std::vector<std::string> of_tests;
   for (const std::string& test : options.tests) {
     const Record predicted = load_record(test, options.map, options.model);
     check_same_kinematics(record, predicted);
     replica_of(predicted, declared);
+    append_told(other_machine(record, predicted), of_tests);
   }
   const std::string page = "report.html";
   std::filesystem::path folder;
   if (!options.out.empty()) folder = page_folder(options.out, page, kDiagnosisMark);
   const auto replica = bare ? nullptr : replica_of(record, declared);
   Record seen = record;
-  const Diagnosis d = bare ? diagnose_quadrature(record, declared)
-                           : diagnose_machine(options, record, *replica, declared, seen);
+  Diagnosis d = bare ? diagnose_quadrature(record, declared)
+                     : diagnose_machine(options, record, *replica, declared, seen);
+  d.warnings.insert(d.warnings.end(), of_tests.begin(), of_tests.end());
   std::cout << to_text(d);
   const int code = stop_requested() ? kExitInterrupted : kExitOk;
   if (folder.empty()) return code;

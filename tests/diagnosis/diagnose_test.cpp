@@ -800,8 +800,12 @@ TEST(Diagnose, CanBeInterruptedAnywhere) {
   EXPECT_EQ(stop_after(1 << 30).verdict, DiagnosisVerdict::explained);
   const int all = asked;
   ASSERT_GT(all, 5);
-  for (int times = 0; times < all; times += std::max(1, all / 40))
-    EXPECT_EQ(stop_after(times).verdict, DiagnosisVerdict::interrupted) << times;
+  for (int times = 0; times < all; times += std::max(1, all / 40)) {
+    const Diagnosis d = stop_after(times);
+    EXPECT_EQ(d.verdict, DiagnosisVerdict::interrupted) << times;
+    // What was not tried is not told as what this run cannot show.
+    for (const Excitation& e : d.excitation) EXPECT_TRUE(e.excited) << times << " " << e.name;
+  }
 }
 
 TEST(Commission, FindsFrictionOfAHealthyMachine) {

@@ -248,7 +248,7 @@ const std::map<std::string, Check>& checks() {
          EXPECT_LT(std::abs(spike_at(s.off.front(), kPi / 2).value()), 0.1 * kUm);
        }},
       {"motor_friction",
-       [](const Shown& s) {  // the force turns over by 2 Fc and the load does not feel it
+       [](const Shown& s) {  // the force turns over by 2 Fc; its twist: effects/MotorFriction
          near(step_at(s.changes_of(Quantity::force).front(), 0).value(), -200, 0.08);
        }},
       {"stribeck",
