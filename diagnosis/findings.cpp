@@ -610,23 +610,26 @@ class Report {
                      believed ? doubt_of(options_, found().explained(), base, now, found().rounding)
                               : doubt_of(options_, found().rounding),
                      options_);
-    // A law that does better than all that was named takes the names away; it can explain all that
+    // A law that does as well as all that was named takes the names away; it can explain all that
     // there is at most.
-    const double named = selection_.base.held_out - found().held_out;
-    if (anything && takes_names_away(named + left, found().added.size(), named, needed)) {
+    Named named{selection_.base.held_out - found().held_out, found().added.size(),
+                std::numeric_limits<double>::infinity()};
+    for (const AddedEffect& a : found().added) named.least = std::min(named.least, a.gain);
+    if (anything && takes_names_away(named.gain + left, named, needed)) {
       LawFit instead = selection_.law_alone
                            ? *selection_.law_alone
                            : best_law(evidence_, selection_.base,
                                       doubt_of(options_, selection_.base.rounding), options_);
-      if (instead.gain > 0.5 * (named + std::max(0.0, law.gain)) &&
-          takes_names_away(instead.gain, found().added.size(), named, needed)) {
+      if (instead.gain > 0.5 * (named.gain + std::max(0.0, law.gain)) &&
+          takes_names_away(instead.gain, named, needed)) {
         std::string names;
         for (const AddedEffect& a : found().added)
           names += (names.empty() ? "" : " with ") + of_.candidates[a.candidate].name();
         for (const ReleasedNumber& r : found().released)
           names += (names.empty() ? "" : " with ") + r.key;
-        d_.notes.push_back(fmt::format("It looks like {}, but {} alone fits better.", names,
-                                       words_of(instead.law.law)));
+        d_.notes.push_back(
+            fmt::format("It looks like {}, but {} alone {}.", names, words_of(instead.law.law),
+                        instead.gain > named.gain ? "fits better" : "does the same"));
         std::erase_if(d_.effects, [](const FoundEffect& e) {
           return !e.place.empty() && e.place != "setup" && e.name != PeriodSlip::text.name;
         });

@@ -20,6 +20,8 @@ constexpr int kRounds = 4;
 constexpr double kNudge = 0.02, kWorthARound = 0.99;
 /// Part of what a true effect does that its model may be wrong by, see takes_names_away().
 constexpr double kWrongAboutOne = 0.05;
+/// Part of what the least of many names does that a law need not do.
+constexpr double kOfTheLeast = 0.1;
 constexpr double kPulse = 2e-3;  // half width of the pulse [s]
 
 using Series = std::vector<double>;
@@ -388,8 +390,9 @@ Eigen::VectorXd refine(const Evidence& evidence, const Machine& without, const L
 
 }  // namespace
 
-bool takes_names_away(double alone, std::size_t names, double named, double needed) {
-  return alone > (names > 1 ? named : named + needed + kWrongAboutOne * named);
+bool takes_names_away(double alone, const Named& named, double needed) {
+  if (named.count <= 1) return alone > named.gain + needed + kWrongAboutOne * named.gain;
+  return alone > named.gain - (named.count >= kImitation ? kOfTheLeast * named.least : 0);
 }
 
 std::string words_of(const Law& law) {

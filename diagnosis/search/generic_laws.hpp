@@ -34,11 +34,22 @@ struct LawFit {
 LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& doubt,
                 const DiagnosisOptions& options);
 
-/// Whether a law that gains `alone` takes the names away from as many effects that gain `named`.
+/// Names that are too many where one law does as well.
+inline constexpr std::size_t kImitation = 3;
+
+/// What effects with names explain.
+struct Named {
+  double gain;        ///< all together
+  std::size_t count;  ///< effects
+  double least;       ///< what the model loses without the one it misses least
+};
+
+/// Whether a law that gains `alone` takes the names away.
 /// A law has ten numbers and bends to what the model of a true effect gets wrong about it, some
 /// percent of what that does: one name only goes where the law gains clearly more, besides what a
-/// law is to gain at all (`needed`). Of several names one law is the simpler account.
-bool takes_names_away(double alone, std::size_t names, double named, double needed);
+/// law is to gain at all (`needed`). Of several names one law is the simpler account; three names
+/// or more go where it gains as much as they do but for a part of the least of them.
+bool takes_names_away(double alone, const Named& named, double needed);
 
 /// "force on X as sgn(v_X) f(q_X)"
 std::string words_of(const Law& law);

@@ -20,7 +20,6 @@ constexpr std::size_t kAttempts = 3;      ///< contenders that are fitted togeth
 constexpr double kAsGood = 0.99;          ///< part of a gain that is as much before all is fitted
 constexpr std::size_t kAlternatives = 1;  ///< other beginnings
 constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to look for another one
-constexpr std::size_t kImitation = 3;  ///< names that are too many where one law does better
 constexpr double kHalf = 0.5;  ///< of what is left: for a further effect than few, or another one
 constexpr double kClearlySimpler = 0.5;  ///< numbers
 constexpr double kPartInALine = 0.25;  ///< of the least gain: less, and a wave is not worth a trial
