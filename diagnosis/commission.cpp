@@ -14,6 +14,7 @@
 #include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/refit.hpp"
 #include "diagnosis/search/screening.hpp"
+#include "diagnosis/search/trial.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {
@@ -279,11 +280,13 @@ class Commissioner {
 
   void tell() {
     const std::map<std::string, Interval> intervals = intervals_of(evidence_, machine_);
+    std::vector<std::string> at_most;
     for (const FreedNumber& n : machine_.nuisances.numbers) {
       const auto i = intervals.find(n.number.key);
       const double half = i == intervals.end() ? 0 : i->second.half_width;
       result_.numbers.push_back({n.number.key, n.value, std::max(n.number.min, n.value - half),
                                  std::min(n.number.max, n.value + half)});
+      if (at_its_most(n.number, n.value)) at_most.push_back(n.number.key);
     }
     // What controllers know stays what is declared.
     result_.machine = as_hypothesis(of_.declared, machine_.machine);
@@ -291,6 +294,10 @@ class Commissioner {
         figures_of(of_.record, of_.replica, of_.declared, result_.machine, "all laps");
     tell_form();
     result_.warnings = evidence_.noise().warnings;
+    for (const std::string& key : at_most)
+      result_.warnings.push_back(key +
+                                 " went to the end of what is allowed: it stands for "
+                                 "something else, which the model lacks");
     for (const SignalFigure& f : result_.figures)
       if (f.after > kWellOff * f.floor) tell_what_stays_off(f);
   }

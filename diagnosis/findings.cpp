@@ -16,6 +16,7 @@
 #include "diagnosis/search/generic_laws.hpp"
 #include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/screening.hpp"
+#include "diagnosis/search/trial.hpp"
 #include "model/axes.hpp"
 #include "model/effects/list.hpp"
 
@@ -103,8 +104,13 @@ class Report {
     tell_clamping();
     tell_noise_lines();
     tell_events();
-    tell_what_is_still_off();
+    std::vector<std::string> off = what_is_still_off();
+    still_off_ = !off.empty();
     if (!selection_.interrupted) tell_law();
+    if (d_.law) off = what_is_still_off();
+    // Without the law, numbers were pulled for want of it.
+    if (!d_.law) d_.notes.insert(d_.notes.end(), pulled_.begin(), pulled_.end());
+    d_.notes.insert(d_.notes.end(), off.begin(), off.end());
     tell_chatter();
     tell_shifts_between_laps();
     std::stable_sort(d_.effects.begin(), d_.effects.end(), [](const auto& a, const auto& b) {
@@ -224,7 +230,7 @@ class Report {
       if (released == found().released.end()) {
         if (!n.common() && !key.starts_with("effects.setup.") &&
             std::abs(n.pull()) > options_.out_of_tolerance)
-          d_.notes.push_back(fmt::format(
+          pulled_.push_back(fmt::format(
               "{} fits best at {:.4g}, {:.1f} tolerances from what is declared ({:.4g}), but that "
               "explains too little to count.",
               key, n.value, std::abs(n.pull()), n.centre));
@@ -256,11 +262,8 @@ class Report {
 
   /// A number that would go on if it might is of something else.
   void tell_bounds(const std::vector<FreedNumber>& numbers) {
-    constexpr double kAtBound = 1e-3;  // of the range
     for (const FreedNumber& n : numbers) {
-      const double range = n.number.max - n.number.min;
-      if (n.number.whole || is_phase(n.number) || n.value < n.number.max - kAtBound * range)
-        continue;
+      if (!at_its_most(n.number, n.value)) continue;
       d_.warnings.push_back(
           fmt::format("{} went to the end of what is allowed, {:.4g}: it is no size that such an "
                       "effect has, and what is there is probably something else.",
@@ -561,11 +564,12 @@ class Report {
     });
   }
 
-  /// Tells signals that are still off by more than noise, and by more of what they were off than a
+  /// Signals that are still off by more than noise, and by more of what they were off than a
   /// model of something that was found may be wrong by, on fitted and on held-out laps: what one
   /// lap does alone is no deviation. Of what an axis that vibrates by itself moves tell_chatter()
   /// tells.
-  void tell_what_is_still_off() {
+  std::vector<std::string> what_is_still_off() const {
+    std::vector<std::string> off;
     const Prediction found = evidence_.predict(d_.found);
     const std::vector<double> before = evidence_.rms_within_laps(evidence_.predict(of_.declared),
                                                                  Role::held_out),
@@ -582,14 +586,14 @@ class Report {
       };
       const double loud = std::max(kLoud * noise, 0.5 * evidence_.step_of(c));
       if (std::min(is, fitted[c]) < loud || beyond(is) < kWrongOfFound * beyond(was)) continue;
-      still_off_ = true;
       const ComparedChannel& channel = evidence_.replica().channels()[c];
       const ShownUnit unit = shown_unit(channel);
-      d_.notes.push_back(fmt::format(
+      off.push_back(fmt::format(
           "{} is still off by {:.3g} {} rms on held-out laps, {:.3g} times "
           "its noise; it was {:.3g}.",
           channel_name(channel), is * unit.factor, unit.name, is / noise, was * unit.factor));
     }
+    return off;
   }
 
   void tell_law() {
@@ -758,6 +762,7 @@ class Report {
   double floor_;
   bool inexact_;            ///< the model is known not to be the machine
   bool still_off_ = false;  ///< some signal is, by more than a model of the cause may be wrong by
+  std::vector<std::string> pulled_;  ///< declared numbers that were, and are not found
   bool withdrawn_ = false, withheld_ = false;
   double told_held_out_ = selection_.found.held_out;  ///< chi-square that what is told leaves
   std::vector<FreedNumber> put_back_;                 ///< released numbers that are not told

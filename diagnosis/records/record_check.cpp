@@ -31,6 +31,7 @@ constexpr double kMoves = 1e-4;             ///< [m or rad] of a command that ev
 constexpr std::size_t kFewestSteps = 500;
 constexpr double kCarries = 0.5;        ///< share of a twist that comes from what the load needs
 constexpr double kCarriesPart = 0.005;  ///< ... from its inertia, and from its friction
+constexpr double kImpossible = 1e4;     ///< times a declared inertia, which no machine is off by
 constexpr double kFarAway = 3;          // times all that lies together
 
 struct Spread {
@@ -545,11 +546,15 @@ class Checker {
                        name(*own)));
     if (!declared_ || fit->mass_explains < 0.1) return;
     const double ratio = fit->mass / declared_->axes[s.axis].mechanics.total_inertia();
-    if (ratio > 5 || ratio < 0.2)
-      warn(fmt::format(
-          "{} over acceleration is {:.4g} {}, {:.3g} times the declared inertia{}; "
-          "check unit and scale of the force",
-          name(s), fit->mass, is_rotary(s.axis) ? "kg m2" : "kg", ratio, usual_mistake(ratio)));
+    if (ratio < 5 && ratio > 0.2) return;
+    const std::string sentence =
+        fmt::format("{} over acceleration is {:.4g} {}, {:.3g} times the declared inertia", name(s),
+                    fit->mass, is_rotary(s.axis) ? "kg m2" : "kg", ratio);
+    if (ratio > kImpossible || ratio < 1 / kImpossible)
+      refuse(sentence +
+             "; check the unit of the time stamps or the rate (ms taken for s makes it "
+             "1e6 times), and unit and scale of position and force");
+    warn(sentence + usual_mistake(ratio) + "; check unit and scale of the force");
   }
 
   Record& record_;

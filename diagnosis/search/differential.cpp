@@ -53,6 +53,14 @@ double median_size(const std::vector<double>& series) {
   return sizes.empty() ? 0 : median(std::move(sizes));
 }
 
+/// The signals that can be compared: "position X, force X".
+std::string measured_by(const Record& record) {
+  std::string names;
+  for (const MeasuredSignal& s : record.signals)
+    if (is_compared(s.kind)) names += (names.empty() ? "" : ", ") + signal_name(s.kind, s.axis);
+  return names.empty() ? "nothing" : names;
+}
+
 /// Standard deviation; 0 where there is nothing.
 double deviation(const std::vector<double>& values) {
   const auto n = static_cast<double>(std::max<std::size_t>(values.size(), 1));
@@ -197,6 +205,13 @@ DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
                   [&](const Stretch& s) { return partners(now, s, healthy.record).empty(); }))
     throw MeasurementError(healthy.record.source + ": does none of the motions of " + now.source +
                            "; a healthy run needs the same program");
+  if (std::none_of(now.signals.begin(), now.signals.end(), [&](const MeasuredSignal& s) {
+        return is_compared(s.kind) && healthy.record.find(s.kind, s.axis);
+      }))
+    throw MeasurementError(fmt::format(
+        "{}: measures {}, {} measures {}: no signal in common; a healthy run needs the same "
+        "columns",
+        healthy.record.source, measured_by(healthy.record), now.source, measured_by(now)));
   DifferentialRecord result{.record = now, .noise = healthy.noise, .healthy = healthy.machine};
   std::size_t fewest = 0, unmatched = 0;
   for (MeasuredSignal& signal : result.record.signals) {

@@ -340,6 +340,12 @@ FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
   return m;
 }
 
+void converge_anew(const Evidence& evidence, FittedMachine& m) {
+  stay(evidence, m);
+  linearise(evidence, m, every(m));
+  converge(evidence, m);
+}
+
 void settle_in(Evidence& evidence, FittedMachine& m, const NoUse& no_use) {
   constexpr double kNoGainYet = std::numeric_limits<double>::infinity();
   anchor_at(evidence, m);

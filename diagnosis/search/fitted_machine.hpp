@@ -61,6 +61,9 @@ std::set<std::string> drives_found(const FittedMachine& machine,
 /// Fits all numbers of a machine together, nuisances included, until nothing moves.
 void converge(const Evidence& evidence, FittedMachine& machine);
 
+/// Takes the sensitivities of all declared numbers where the machine stands, then fits as above.
+void converge_anew(const Evidence& evidence, FittedMachine& machine);
+
 /// Frees those common numbers that make something of what was found: of the drives where that is,
 /// and of the probe.
 void add_common(const Evidence& evidence, FittedMachine& machine,

@@ -17,6 +17,7 @@ namespace {
 constexpr std::size_t kHats = 10;
 constexpr std::size_t kSimulated = 3;  // of the best laws by their columns
 constexpr int kRounds = 4;
+constexpr std::size_t kAlternations = 4;
 constexpr double kNudge = 0.02, kWorthARound = 0.99;
 /// Part of what a true effect does that its model may be wrong by, see takes_names_away().
 constexpr double kWrongAboutOne = 0.05;
@@ -448,7 +449,27 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
     }
   }
   if (!acting) return best;
-  const Eigen::VectorXd sigma = refine(evidence, at.machine, linear, acting);
+  Eigen::VectorXd sigma = refine(evidence, at.machine, linear, acting);
+  // For want of the law declared numbers may have been pulled, and their columns lack it: they are
+  // fitted with it, then the law where they stand.
+  FittedMachine without = at;
+  std::vector<LinearPart> parts;  // `acting` refers to them
+  parts.reserve(kAlternations);
+  for (std::size_t i = 0; i < kAlternations; ++i) {
+    FittedMachine moved = without;
+    moved.machine = Acting::with(moved.machine, acting->law);
+    converge_anew(evidence, moved);
+    moved.machine.effects.laws.pop_back();
+    parts.push_back(moved.linear());
+    auto again = std::make_unique<Acting>(evidence, moved.machine, acting->law, parts.back());
+    Eigen::VectorXd anew = refine(evidence, moved.machine, parts.back(), again);
+    const double before = acting->settled.fitted, now = again->settled.fitted;
+    if (!(now < before)) break;
+    acting = std::move(again);
+    sigma = std::move(anew);
+    without = std::move(moved);
+    if (now > kWorthARound * before) break;
+  }
   Law& law = best.law.law = acting->law;
   law.label = "learned: " + words_of(law);
   for (std::size_t h = 0; h < law.value.size(); ++h) {
@@ -460,7 +481,7 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
   best.law.words = "behaves like " + words_of(law);
   best.law.share = std::min(1.0, best.gain / excess);
   // What that leaves is told in the loop: numbers moved along their columns may disappoint there.
-  FittedMachine learned = at;
+  FittedMachine learned = without;
   learned.machine = acting->machine;
   converge(evidence, learned);
   best.machine = evidence.chi2(learned.residual, Role::fitted) < acting->settled.fitted

@@ -48,6 +48,11 @@ bool has_no_phase(const FreeNumber& n) { return has_part(n.key, "_bow_"); }
 
 bool is_limit(const FreeNumber& n) { return has_part(n.key, ".range_clip.limit_"); }
 
+bool at_its_most(const FreeNumber& n, double value) {
+  constexpr double kAtBound = 1e-3;  // of the range
+  return !n.whole && !is_phase(n) && value >= n.max - kAtBound * (n.max - n.min);
+}
+
 std::vector<Trial> trials(const Machine& base, const std::vector<Candidate>& candidates,
                           const TrialValues& trial_values) {
   std::vector<Trial> all;

@@ -45,6 +45,8 @@ bool is_phase(const FreeNumber& number);
 bool has_no_phase(const FreeNumber& number);
 /// An amplitude whose null value is no limit at all: it does more the smaller it is.
 bool is_limit(const FreeNumber& number);
+/// Whether a fitted value went to the most that is allowed: it would go on, for something else.
+bool at_its_most(const FreeNumber& number, double value);
 
 std::vector<Trial> trials(const Machine& base, const std::vector<Candidate>& candidates,
                           const TrialValues& values);

@@ -698,6 +698,20 @@ TEST(LessHealthy, RefusesARunOfAMachineThatIsBuiltOtherwise) {
   EXPECT_THROW(less(), MeasurementError);
 }
 
+TEST(LessHealthy, RefusesARunWithoutASignalInCommon) {
+  const Record healthy = measured({}, 45), now = measured({}, 46);
+  toy::ToyReplica replica(healthy);
+  HealthyRun run = healthy_run(healthy, replica, {});
+  for (MeasuredSignal& s : run.record.signals)
+    if (is_compared(s.kind)) s.axis = 3;
+  try {
+    less_healthy(now, run);
+    FAIL() << "compared with nothing";
+  } catch (const MeasurementError& e) {
+    EXPECT_NE(std::string(e.what()).find("no signal in common"), std::string::npos) << e.what();
+  }
+}
+
 TEST(LessHealthy, RefusesARunThatDoesOtherMotionsOfTheSameLength) {
   Record healthy = measured({}, 45), now = measured({}, 46);
   toy::ToyReplica of_healthy(healthy);

@@ -360,6 +360,19 @@ TEST(ImportTable, NamesWrongUnitsSignsAndSwappedColumns) {
   }
 }
 
+TEST(ImportTable, RefusesAnInertiaThatOnlyAWrongTimeMakes) {
+  MeasuredTable table = table_of(columns());
+  for (MeasuredColumn& c : table.columns)
+    if (c.name == "t")
+      for (double& t : c.value) t *= 1000;
+  const std::string said =
+      refusal(kTime + signal("cmd", "command", "X", "m") + signal("pos", "position", "X", "m") +
+                  signal("force", "force", "X", "N"),
+              table);
+  EXPECT_NE(said.find("times the declared inertia"), std::string::npos) << said;
+  EXPECT_NE(said.find("unit of the time stamps"), std::string::npos) << said;
+}
+
 TEST(ImportTable, WarnsOfWhatIsOnlySuspicious) {
   const auto with = [](const std::string& column, std::function<double(double)> f,
                        const std::string& map) {
