@@ -91,11 +91,16 @@ class Importer {
   }
 
   const MeasuredColumn& usable(const MeasuredColumn& c) const {
-    if (c.bad_line > 0)
-      throw MeasurementError(
-          fmt::format("{}:{}: \"{}\" in column \"{}\" is no number; if it means "
-                      "that there is none, say so in the map: missing = [\"{}\"]",
-                      table_.source, c.bad_line, c.bad_text, c.name, c.bad_text));
+    if (c.bad_line > 0) {
+      const bool of_digits = c.bad_text.find_first_of("0123456789") != c.bad_text.npos;
+      throw MeasurementError(fmt::format(
+          "{}:{}: \"{}\" in column \"{}\" is no number; {}", table_.source, c.bad_line, c.bad_text,
+          c.name,
+          of_digits
+              ? "only digits, a sign, one decimal point and an exponent make one"
+              : fmt::format("if it means that there is none, say so in the map: missing = [\"{}\"]",
+                            c.bad_text)));
+    }
     if (c.value.empty()) throw MeasurementError(table_.source + ": holds no rows");
     return c;
   }

@@ -80,7 +80,14 @@ class TextTable {
     if (text_.substr(0, 2) == "\xFF\xFE" || text_.substr(0, 2) == "\xFE\xFF")
       fail(1, "is UTF-16 text; save it as UTF-8 or ASCII");
     while (!text_.empty()) take_line();
-    if (table_.rows() == 0) throw MeasurementError(name_ + ": holds no numbers");
+    if (table_.rows() == 0)
+      throw MeasurementError(
+          name_ + ": holds no numbers" +
+          (fields_.size() == 1 && format_.separator != Separator::any
+               ? fmt::format("; its lines are one value each, divided by '{}' as the map says "
+                             "(separator)",
+                             separator_sign())
+               : ""));
     return std::move(table_);
   }
 

@@ -24,6 +24,7 @@ constexpr double kBelongs = 0.7;            ///< correlation of what belongs tog
 constexpr double kFits = 0.95;              ///< ... of what certainly does
 constexpr double kSlope = 0.1;              ///< how far a slope may be off 1
 constexpr double kLead = 2e-3;              ///< [s] that no feed-forward makes by itself
+constexpr double kLate = 0.2e-3;            ///< [s] that no viscous drag twists a transmission by
 constexpr std::size_t kEnoughToTell = 200;  // values, whether one of them stands alone
 constexpr std::size_t kOneIn = 1000;        // such bends are usual
 constexpr double kLone = 10;                // times what is usual
@@ -107,7 +108,8 @@ class Checker {
     check_values();
     for (const MeasuredSignal& v : velocities_) check_velocity(v);
     for (const MeasuredSignal& s : record_.signals) {
-      if (s.kind == SignalKind::position) check_command(s), check_twist(s), check_sides(s);
+      if (s.kind == SignalKind::position)
+        check_command(s), check_twist(s), check_sides(s), check_late(s);
       if (s.kind == SignalKind::position || s.kind == SignalKind::command) check_range(s);
     }
     for (const MeasuredSignal& s : record_.signals)
@@ -320,6 +322,18 @@ class Checker {
                     name(*twist)));
   }
 
+  /// One side of a transmission stays behind the other by the same time at every speed.
+  void check_late(const MeasuredSignal& s) {
+    const MeasuredSignal* twist = record_.find(SignalKind::twist, s.axis);
+    if (!twist || constant(twist->value) || constant(s.value)) return;
+    const auto fit = fit_force(*twist, s);
+    if (!fit || fit->explained < kFits || fit->viscous_explains < kCarries) return;
+    const double late = std::abs(fit->viscous);
+    if (late < std::max(kLate, 0.3 * record_.period)) return;
+    warn(fmt::format("{} goes along with the velocity as if the {} were recorded {:.3g} ms late",
+                     name(*twist), fit->viscous < 0 ? "load" : "motor", 1e3 * late));
+  }
+
   bool is_pushed_ahead(const MeasuredSignal& twist, const MeasuredSignal& force) const {
     const Relation r = relate(smoothed(force.value, half_), smoothed(twist.value, half_));
     return r.known && r.correlation > kBelongs;
@@ -457,9 +471,10 @@ class Checker {
 
   struct ForceFit {
     double mass = 0, viscous = 0, dry = 0;
-    double explained = 0;      ///< share of the variance
-    double mass_explains = 0;  ///< ... that is lost without the mass
-    double dry_explains = 0;   ///< ... that is lost without dry friction
+    double explained = 0;         ///< share of the variance
+    double mass_explains = 0;     ///< ... that is lost without the mass
+    double viscous_explains = 0;  ///< ... that is lost without viscous friction
+    double dry_explains = 0;      ///< ... that is lost without dry friction
   };
 
   std::optional<ForceFit> fit_force(const MeasuredSignal& force,
@@ -497,7 +512,7 @@ class Checker {
       b[column] = 0;
       return (square - others.ldlt().solve(b).dot(b) - left) / variance;
     };
-    return ForceFit{x[0], x[1], x[2], 1 - left / variance, explains(0), explains(2)};
+    return ForceFit{x[0], x[1], x[2], 1 - left / variance, explains(0), explains(1), explains(2)};
   }
 
   /// No drive gives five times what it can.

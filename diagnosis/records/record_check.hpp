@@ -10,7 +10,8 @@
 //   command     correlation of the position's steps with those of every axis' command; the slope of
 //               what it is ahead over the command's velocity: 2 ms at most
 //               a position that stays while its command goes on
-//   twist       its span against that of the position: half at most
+//   twist       its span against that of the position: half at most; what it is behind as a part of
+//               the velocity: 0.2 ms at most
 //   force       least squares F = M a + B v + C sgn(v) + D (band-limited): M against the declared
 //               mass, the share that is explained, the sign; five times the declared limit at most
 //   range       positions against the declared travel, speeds against the declared limit

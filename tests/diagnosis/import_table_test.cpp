@@ -436,6 +436,33 @@ TEST(ImportTable, MotorAndLoadThatAreSwappedAreSuspicious) {
   EXPECT_FALSE(warned(of("scale", "cmd"), words)) << all_warnings(of("scale", "cmd"));
 }
 
+TEST(ImportTable, ASideOfATransmissionThatIsRecordedLateIsSuspicious) {
+  Columns all = columns();
+  all["motor"] = [](double t) { return LinearAxis::position(t) + LinearAxis::force(t) / 2e7; };
+  all["late"] = [](double t) { return LinearAxis::position(t - 0.001); };
+  const auto of = [&](const std::string& motor, const std::string& load) {
+    return imported(
+        kTime + signal(motor, "motor_position", "X", "m") + signal(load, "load_position", "X", "m"),
+        table_of(all));
+  };
+  EXPECT_TRUE(warned(of("motor", "late"), "as if the load were recorded 1"))
+      << all_warnings(of("motor", "late"));
+  EXPECT_TRUE(warned(of("late", "motor"), "as if the motor were recorded 1"));
+  EXPECT_FALSE(warned(of("motor", "cmd"), "recorded")) << all_warnings(of("motor", "cmd"));
+}
+
+TEST(ImportTable, TextThatIsNoNumberIsCalledMissingOnlyWithoutDigits) {
+  const auto said = [](const std::string& text) {
+    MeasuredTable table = table_of(columns());
+    for (MeasuredColumn& c : table.columns)
+      if (c.name == "pos") c.bad_line = 7, c.bad_text = text;
+    return refusal(sound_map(), table);
+  };
+  EXPECT_NE(said("n/a").find("missing = [\"n/a\"]"), std::string::npos) << said("n/a");
+  EXPECT_NE(said("1,008.74").find("only digits"), std::string::npos) << said("1,008.74");
+  EXPECT_EQ(said("1,008.74").find("missing"), std::string::npos);
+}
+
 /// -9999 for "none" that the map does not know.
 TEST(ImportTable, ValuesThatFillGapsAreSuspicious) {
   MeasuredTable table = table_of(columns());
