@@ -25,6 +25,7 @@ constexpr double kFits = 0.95;              ///< ... of what certainly does
 constexpr double kSlope = 0.1;              ///< how far a slope may be off 1
 constexpr double kLead = 2e-3;              ///< [s] that no feed-forward makes by itself
 constexpr double kLate = 0.2e-3;            ///< [s] that no viscous drag twists a transmission by
+constexpr double kViscous = 0.1;            ///< share of a sine that nothing but the velocity makes
 constexpr std::size_t kEnoughToTell = 200;  // values, whether one of them stands alone
 constexpr std::size_t kOneIn = 1000;        // such bends are usual
 constexpr double kLone = 10;                // times what is usual
@@ -327,7 +328,7 @@ class Checker {
     const MeasuredSignal* twist = record_.find(SignalKind::twist, s.axis);
     if (!twist || constant(twist->value) || constant(s.value)) return;
     const auto fit = fit_force(*twist, s);
-    if (!fit || fit->explained < kFits || fit->viscous_explains < kCarries) return;
+    if (!fit || fit->explained < kFits || fit->viscous_explains < kViscous) return;
     const double late = std::abs(fit->viscous);
     if (late < std::max(kLate, 0.3 * record_.period)) return;
     warn(fmt::format("{} goes along with the velocity as if the {} were recorded {:.3g} ms late",

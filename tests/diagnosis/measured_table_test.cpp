@@ -98,7 +98,7 @@ TEST(MeasuredTable, RefusesWithLineAndReason) {
   EXPECT_NE(refusal("t,q\n").find("holds no numbers"), std::string::npos);
   EXPECT_NE(refusal("").find("holds no numbers"), std::string::npos);
   try {
-    parse_text_table("t,q\n0,1\n", "run.csv", {.separator = ImportMap::Separator::semicolon});
+    parse_text_table("t,q,f\n0,1.5,2\n", "run.csv", {.separator = ImportMap::Separator::semicolon});
     FAIL() << "one column of text";
   } catch (const MeasurementError& e) {
     EXPECT_NE(std::string(e.what()).find("one value each, divided by ';'"), std::string::npos)
