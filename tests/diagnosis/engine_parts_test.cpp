@@ -12,6 +12,7 @@
 #include "diagnosis/search/noise_audit.hpp"
 #include "diagnosis/search/packed_column.hpp"
 #include "diagnosis/search/selection.hpp"
+#include "diagnosis/search/trial.hpp"
 #include "diagnosis/search/trial_values.hpp"
 #include "toy_machine.hpp"
 
@@ -71,6 +72,18 @@ TEST(GenericLaws, TakeANameAwayWhereTheyClearlyDoBetter) {
   EXPECT_TRUE(takes_names_away(164210, {164350, 3, 7740}, 40));
   // A small effect that the law does not do.
   EXPECT_FALSE(takes_names_away(164210, {164350, 3, 150}, 40));
+}
+
+TEST(FreeNumber, IsAtItsMostWithinAThousandthOfItsRange) {
+  const FreeNumber lag{"axes.X.position_lag_us", 100, 0, 5000, true};
+  EXPECT_TRUE(at_its_most(lag, 5000));
+  EXPECT_TRUE(at_its_most(lag, 4996));
+  EXPECT_FALSE(at_its_most(lag, 4990));
+  EXPECT_FALSE(at_its_most(lag, 0));
+  const FreeNumber without_end{"axes.X.load_kg", 1, 0, HUGE_VAL};
+  EXPECT_FALSE(at_its_most(without_end, 1e9));
+  const FreeNumber phase{"effects.X.cogging.phase_deg", 10, 0, 360};
+  EXPECT_FALSE(at_its_most(phase, 360));
 }
 
 TEST(PackedColumn, OfALongRecordIsTheColumnToThirtyThousandthsOfWhatIsAround) {
