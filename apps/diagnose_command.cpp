@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -25,6 +26,7 @@
 #include "diagnosis/report/diagnosis_text.hpp"
 #include "diagnosis/search/freed_number.hpp"
 #include "diagnosis/search/suspects.hpp"
+#include "diagnosis/search/unknown_force.hpp"
 
 namespace vcnc {
 
@@ -55,6 +57,7 @@ void append_figures(std::vector<SignalFigure>& figures, const Record& record,
   if (healthy) less = less_healthy(record, *healthy);
   const Record& of = healthy ? less.record : record;
   const auto replica = replica_of(of, declared);
+  if (healthy) replica->apply(less.unknown);
   const std::vector<SignalFigure> more =
       figures_of(of, *replica, declared, found, name, less.noise_scale);
   figures.insert(figures.end(), more.begin(), more.end());
@@ -88,6 +91,19 @@ std::string other_machine(const Record& run, const Record& other) {
       keys.size() > 1 ? fmt::format("; {} more keys differ", keys.size() - 1) : "");
 }
 
+void tell_unknown_forces(const ForceOfAxes& unknown, std::vector<std::string>& notes) {
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    double sum = 0;
+    for (const double f : unknown[axis]) sum += f * f;
+    if (sum > 0)
+      notes.push_back(fmt::format(
+          "The reference run has a force on {} that the declared machine has not, {:.3g} {} rms; "
+          "it counts as there in this run, too.",
+          kAxisNames[axis], std::sqrt(sum / static_cast<double>(unknown[axis].size())),
+          is_rotary(axis) ? "N m" : "N"));
+  }
+}
+
 void append_told(std::string sentence, std::vector<std::string>& warnings) {
   if (!sentence.empty()) warnings.push_back(std::move(sentence));
 }
@@ -106,7 +122,12 @@ bool same_values(const Record& a, const Record& b) {
 std::optional<HealthyRun> reference_run(const DiagnoseOptions& options, const Machine& declared) {
   if (options.reference.empty()) return std::nullopt;
   const Record record = load_record(options.reference, options.map, options.model);
-  return healthy_run(record, *replica_of(record, declared), declared);
+  const auto replica = replica_of(record, declared);
+  ForceOfAxes unknown = unknown_force(record, declared);
+  replica->apply(unknown);
+  HealthyRun healthy = healthy_run(record, *replica, declared);
+  healthy.unknown = std::move(unknown);
+  return healthy;
 }
 
 int compare_models(const DiagnoseOptions& options, const Record& record, const Machine& declared) {
@@ -162,7 +183,9 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
   if (healthy) {
     const DifferentialRecord difference = less_healthy(record, *healthy);
     seen = difference.record;
+    replica.apply(difference.unknown);
     d = diagnose(of, difference, asked, keep_going);
+    tell_unknown_forces(healthy->unknown, d.notes);
   } else {
     d = diagnose(of, asked, keep_going);
   }

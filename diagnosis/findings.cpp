@@ -727,6 +727,7 @@ class Report {
     d_.left = ratio < kQuiet ? 0 : std::sqrt(ratio);
     const bool excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),
                                      [](const Excitation& e) { return e.excited; });
+    const bool few = selection_.found.found() <= options_.few_effects;
     using enum DiagnosisVerdict;
     if (selection_.interrupted)
       d_.verdict = interrupted;
@@ -736,11 +737,12 @@ class Report {
     else if (d_.law || !d_.vibrations.empty())
       d_.verdict = named ? partly : unexplained;
     else if (named)
-      d_.verdict = !still_off_ && (ratio < kSilent || d_.explained_share > kAllExplained ||
-                                   (ratio < kQuiet && (d_.explained_share > kMostExplained ||
-                                                       !before_.chatter.empty())))
-                       ? explained
-                       : partly;
+      d_.verdict =
+          !still_off_ && (ratio < kSilent || d_.explained_share > kAllExplained ||
+                          (ratio < kQuiet && few &&
+                           (d_.explained_share > kMostExplained || !before_.chatter.empty())))
+              ? explained
+              : partly;
     else
       d_.verdict = !still_off_ && ratio < kQuiet ? no_deviation : unexplained;
     if (!d_.differential && !selection_.interrupted && evidence_.noise().from_repetitions &&

@@ -23,6 +23,13 @@
 
 namespace vcnc {
 
+/// A force on the load of an axis of which only a healthy run of the same motion tells
+/// (search/unknown_force.hpp), and how fast the healthy machine was.
+struct UnknownForce {
+  std::vector<double> force;     ///< one per sample [N or N m]; empty: none
+  std::vector<double> velocity;  ///< of the load; empty: the force is taken as it comes
+};
+
 struct CommandedMotion {
   /// What is known of one axis.
   enum class Told {
@@ -34,6 +41,7 @@ struct CommandedMotion {
   PerAxis<bool> followed{};  ///< told is command, but made from where it was measured
   PerAxis<std::vector<double>> position, velocity;  ///< one per sample; empty where nothing is told
   PerAxis<std::vector<KnownForce>> force;           ///< one per sample; empty: none
+  PerAxis<UnknownForce> unknown;
   std::vector<char> known;  ///< false: bridged, soon after, or a begin in motion
 
   AxisVector start(const AxisVector& declared) const;

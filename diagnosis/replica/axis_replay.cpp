@@ -1,6 +1,8 @@
 #include "diagnosis/replica/axis_replay.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <thread>
 #include <utility>
 
@@ -97,6 +99,63 @@ class Rest {
   std::size_t cycles_ = 0;
 };
 
+/// The force on the load that no effect makes, taken from where the healthy machine was when it was
+/// as fast: friction turns over where an axis does, however late that is. Of an axis that moves as
+/// the healthy one did by tau ago,
+///
+///   v0 - v = tau a0,
+///
+/// so tau comes from the mean products of both sides with a0, over some 20 ms.
+template <class Real>
+class LateForce {
+ public:
+  explicit LateForce(const UnknownForce& of) : of_(of) {
+    double most = 0;
+    for (std::size_t k = 1; k < of.velocity.size(); ++k)
+      most = std::max(most, std::pow(gain(k), 2));
+    least_ = kLeast * most;
+  }
+  bool some() const { return !of_.force.empty(); }
+  /// Whether it is the same at the end of a cycle as at its beginning.
+  bool lasts(std::size_t cycle) const {
+    return !some() || of_.force[cycle] == of_.force[cycle - 1];
+  }
+  /// At the end of a cycle, of a drive that was at these positions at the ends of those before.
+  Real at(std::size_t cycle, const Real& position, const Real& before) {
+    Real force{};
+    const bool moves = cycle > 1 && !of_.velocity.empty();
+    const double a0 = moves ? gain(cycle - 1) : 0, v0 = moves ? of_.velocity[cycle - 1] : 0;
+    own_ = kKept * own_ + a0 * a0;
+    for (std::size_t n = 0; n < kLanesOf<Real>; ++n) {
+      const double v = (lane(position, n) - lane(before, n)) / kCycle;
+      products_[n] = kKept * products_[n] + (moves ? (v0 - v) * a0 : 0);
+      const double late = own_ > 0 ? products_[n] / (own_ + least_) : 0;
+      set_lane(force, n, told(static_cast<double>(cycle) - std::clamp(late, -kMost, kMost)));
+    }
+    return force;
+  }
+
+ private:
+  static constexpr double kCycle = 1e-3;  // [s]
+  static constexpr double kKept = 0.95;   // from cycle to cycle
+  static constexpr double kMost = 20;     // cycles
+  static constexpr double kLeast = 1e-3;  // of the largest square of a0
+
+  /// Of velocity within a cycle.
+  double gain(std::size_t cycle) const { return of_.velocity[cycle] - of_.velocity[cycle - 1]; }
+  double told(double cycle) const {
+    const double last = static_cast<double>(of_.force.size() - 1),
+                 at = std::clamp(cycle, 0.0, last);
+    const auto i = static_cast<std::size_t>(at);
+    const double part = at - static_cast<double>(i);
+    return part > 0 ? std::lerp(of_.force[i], of_.force[i + 1], part) : of_.force[i];
+  }
+
+  const UnknownForce& of_;
+  double least_ = 0, own_ = 0;
+  PerLane<Real, double> products_{};
+};
+
 /// Replays on any number of lanes with `per_cycle` truths; after_cycle(k) is called after each.
 template <class Real, class F>
 std::vector<AxisReplay> replay_lanes(AxisDriveOf<Real>& drive, std::size_t axis,
@@ -118,12 +177,20 @@ std::vector<AxisReplay> replay_lanes(AxisDriveOf<Real>& drive, std::size_t axis,
   const bool can_rest = drive.can_rest() && known.empty();
   bool rests = false;
   Rest<Real> rest;
+  LateForce<Real> unknown(motion.unknown[axis]);
   AxisCycleOf<Real> cycle;
+  for (std::size_t n = 0; n < lanes; ++n)
+    set_lane(cycle.truth.back(), n, start_position(variants[n].actual, kSeed)[axis]);
+  Real before = cycle.truth.back();
   for (std::size_t k = 1; k < cycles; ++k) {
     const Command command = commands.at(k);
-    if (rests && rest.lasts(command, axis)) {
+    if (rests && rest.lasts(command, axis) && unknown.lasts(k)) {
       drive.rest();
     } else {
+      if (unknown.some()) {
+        drive.tell_load_force(unknown.at(k, cycle.truth.back(), before));
+        before = cycle.truth.back();
+      }
       drive.tell_commands(command.position, command.velocity);
       if (!known.empty()) drive.tell_force(known[k]);
       cycle = drive.follow({Real(command.position[axis]), Real(command.velocity[axis])});

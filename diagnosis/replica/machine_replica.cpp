@@ -14,7 +14,8 @@ namespace vcnc {
 
 namespace {
 
-constexpr double kCycleTime = 1e-3;  // [s]
+constexpr double kCycleTime = 1e-3;     // [s]
+constexpr double kUnknownForce = 0.05;  // standard deviation, of a force that a healthy run tells
 constexpr std::size_t kAxisReplays = 6, kWatched = 1, kPoses = 4, kBalls = 8;
 
 /// The commands at 1 ms.
@@ -191,6 +192,29 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
 }
 
 MachineReplica::~MachineReplica() = default;
+
+void MachineReplica::apply(const PerAxis<std::vector<double>>& unknown) {
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    motion_.unknown[axis] = {};
+    if (!unknown[axis].empty())
+      motion_.unknown[axis].force = at_cycles(unknown[axis], period_, motion_.known.size());
+    axis_memory_[axis]->clear();
+    watched_[axis]->clear();
+  }
+  pose_memory_->clear();
+  ball_memory_->clear();
+  const Hypothesis h = hypothesis_of(declared_);
+  parallel_for(kAxisCount, [&](std::size_t axis) {
+    UnknownForce& of = motion_.unknown[axis];
+    if (of.force.empty()) return;
+    const AxisReplay replay = replay_axis(h.machine, h.actual, axis, motion_);
+    of.velocity.assign(replay.cycles(), 0.0);
+    for (std::size_t k = 1; k < of.velocity.size(); ++k)
+      of.velocity[k] = (*replay.end_of(k) - *replay.end_of(k - 1)) / kCycleTime;
+  });
+  anchored_.clear();
+  anchor(declared_);
+}
 
 MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine,
                                                          Encoders encoders) const {
@@ -395,6 +419,30 @@ std::vector<std::vector<double>> MachineReplica::rounding(const Machine& machine
     for (std::size_t k = 0; k < change[c].size(); ++k) change[c][k] -= before[c][k];
   }
   return change;
+}
+
+std::vector<SeriesOfChannels> MachineReplica::of_unknown_forces() const {
+  std::vector<SeriesOfChannels> all;
+  const Hypothesis declared = hypothesis_of(declared_);
+  const AxisReplays axes = axes_of(declared);
+  const Prediction before = predict(declared, axes);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    if (motion_.unknown[axis].force.empty()) continue;
+    CommandedMotion motion = motion_;
+    for (double& f : motion.unknown[axis].force) f *= 1 + kUnknownForce;
+    AxisReplay replay = replay_axis(declared.machine, declared.actual, axis, motion);
+    sample_as_recorded(replay);
+    AxisReplays changed = axes;
+    changed[axis] = std::make_shared<const AxisReplay>(std::move(replay));
+    Hypothesis other = declared;
+    other.ball += "|more force on " + std::string(kAxisNames[axis]);
+    const Prediction after = predict(other, changed);
+    SeriesOfChannels& change = all.emplace_back(channels_.size());
+    for (std::size_t c = 0; c < channels_.size(); ++c)
+      for (std::size_t k = 0; !after[c].shares(before[c]) && k < samples_; ++k)
+        change[c].push_back(after[c][k] - before[c][k]);
+  }
+  return all;
 }
 
 Prediction MachineReplica::predict(const Hypothesis& h, const AxisReplays& axes) const {

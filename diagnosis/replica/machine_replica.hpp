@@ -61,8 +61,15 @@ class MachineReplica : public Replica {
 
   std::vector<std::vector<double>> rounding(const Machine& machine) const override;
 
+  std::vector<SeriesOfChannels> of_unknown_forces() const override;
+
   /// What follows is asked about machines near this one. Not while others predict.
   bool anchor(const Machine& machine) override;
+
+  /// Every machine has these forces on the loads of its axes besides, one per sample of the record
+  /// [N or N m]; empty: none. They are known to 5 %, as the friction of another day is. Not while
+  /// others predict.
+  void apply(const PerAxis<std::vector<double>>& unknown);
 
  private:
   /// Results by fingerprint, the least recently used ones forgotten.

@@ -65,6 +65,9 @@ class Replica {
   /// A sample of what the rounding of the encoders that a machine declares does to each channel,
   /// which no prediction has in it; empty where there is none.
   virtual std::vector<std::vector<double>> rounding(const Machine&) const { return {}; }
+  /// What a standard deviation of each of the forces that only a healthy run tells of makes of the
+  /// channels of the declared machine; a channel that it leaves alone may be empty.
+  virtual std::vector<SeriesOfChannels> of_unknown_forces() const { return {}; }
   /// What follows is asked about machines near this one: a replica may be exact here and quicker
   /// elsewhere. False: it was here already, and predicts what it did. Not while others predict.
   virtual bool anchor(const Machine&) { return true; }

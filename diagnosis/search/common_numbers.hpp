@@ -48,6 +48,9 @@ class ReplicaOfChange final : public Replica {
   std::vector<std::vector<double>> rounding(const Machine& machine) const override {
     return replica_.rounding(without_common(machine));
   }
+  std::vector<SeriesOfChannels> of_unknown_forces() const override {
+    return replica_.of_unknown_forces();
+  }
   bool anchor(const Machine& machine) override;
 
  private:

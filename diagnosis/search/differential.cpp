@@ -151,6 +151,20 @@ std::vector<const Stretch*> partners(const Record& now, const Stretch& lap, cons
   return laps;
 }
 
+/// What was in the laps of a healthy run, in those of another run that do the same.
+std::vector<double> in_laps_of(const Record& now, const HealthyRun& healthy,
+                               const std::vector<double>& series) {
+  if (series.empty()) return {};
+  std::vector<double> result(now.samples(), kMissing);
+  for (const Stretch& lap : now.stretches) {
+    const std::vector<const Stretch*> laps = partners(now, lap, healthy.record);
+    for (std::size_t k = lap.begin; !laps.empty() && k < lap.end; ++k)
+      result[k] = series[std::min(laps[0]->begin + (k - lap.begin), laps[0]->end - 1)];
+  }
+  hold_over_gaps(result);
+  return result;
+}
+
 /// Whether a sample of a signal is left out for what laps did not share.
 bool unlike(const std::vector<LapEvent>& events, const MeasuredSignal& signal, std::size_t sample) {
   return std::any_of(events.begin(), events.end(), [&](const LapEvent& e) {
@@ -245,6 +259,8 @@ DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
     result.record.warnings.push_back(
         "Some motions have no partner in the reference run and are left out: was it the same "
         "program?");
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    result.unknown[axis] = in_laps_of(now, healthy, healthy.unknown[axis]);
   result.off = leave_out_untold(result.record, now);
   if (fewest > 0) result.noise_scale = std::sqrt(1 + 1 / static_cast<double>(fewest));
   return result;

@@ -16,6 +16,7 @@
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
 #include "diagnosis/search/lap_events.hpp"
+#include "diagnosis/search/unknown_force.hpp"
 #include "diagnosis/search/unrest.hpp"
 #include "model/axes.hpp"
 #include "model/machine.hpp"
@@ -26,8 +27,9 @@ struct DifferentialRecord {
   Record record;
   double noise_scale = 1;  ///< of the standard deviation
   PerAxis<double> off{};  ///< RMS of a reading of the probe less yhat in the healthy run, x y z [m]
-  HealthyNoise noise;
-  Machine healthy;  ///< what the record is held against instead of the declared machine
+  HealthyNoise noise{};
+  ForceOfAxes unknown{};  ///< as in the healthy run
+  Machine healthy;        ///< what the record is held against instead of the declared machine
 };
 
 /// A healthy run and the declared machine with the piece where it was clamped for that.
@@ -37,7 +39,8 @@ struct HealthyRun {
   HealthyNoise noise;
   std::vector<LapEvent> events;  ///< what was not the same in all laps
   std::vector<ComparedChannel> channels;
-  Prediction predicted;  ///< of `machine`
+  Prediction predicted;   ///< of `machine`
+  ForceOfAxes unknown{};  ///< that the replica was given
 };
 HealthyRun healthy_run(const Record& record, Replica& replica, const Machine& declared);
 

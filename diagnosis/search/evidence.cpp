@@ -115,6 +115,7 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
   for (std::size_t c = 0; c < difference_.size(); ++c)
     for (std::size_t k = 0; k < difference_[c].size(); ++k) difference_[c][k] -= declared_[c][k];
   mask(difference_);
+  of_forces_ = replica.of_unknown_forces();
   per_shift_ = readings_per_shift(with_piece_shifted(declared, kShift));
   // A piece, an axis or a clock that drifts from lap to lap is no noise of the samples.
   if (partition_.repeated && !per_shift_.empty()) {
@@ -145,8 +146,12 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
   }
   count_valid();
   of_shifts_ = {};
+  std::vector<Column::Channels> of_laps;
+  if (!rounding.empty() && !per_shift_.empty())
+    of_laps = whitened_shifts(rms_shift(partition_.stretches, per_shift_, rounding));
+  for (const SeriesOfChannels& force : of_forces_) of_laps.push_back(whitened(force));
+  if (!of_laps.empty()) of_shifts_ = ShiftWhitening(partition_.stretches, of_laps);
   if (rounding.empty()) return;
-  if (!per_shift_.empty()) whiten_shifts(rms_shift(partition_.stretches, per_shift_, rounding));
   rms_of_rounding_ = rms_of_all(rounding);
   chi2_of_rounding_ = chi2_of(whiten(rounding), Role::held_out);
 }
@@ -291,17 +296,15 @@ void Evidence::count_valid() {
   }
 }
 
-void Evidence::whiten_shifts(const Eigen::Vector3d& shift) {
-  std::vector<Column::Channels> of_shifts;
+std::vector<Column::Channels> Evidence::whitened_shifts(const Eigen::Vector3d& shift) const {
+  std::vector<Column::Channels> all;
   for (std::size_t j = 0; j < per_shift_.size(); ++j) {
-    Column::Channels& column = of_shifts.emplace_back(per_shift_[j].size());
-    for (std::size_t c = 0; c < column.size(); ++c) {
-      std::vector<double> change = per_shift_[j][c];
-      for (double& d : change) d *= shift[static_cast<Eigen::Index>(j)];
-      if (!change.empty() && keep_comparable(c, change)) column[c] = whiten(c, change);
-    }
+    SeriesOfChannels change = per_shift_[j];
+    for (std::vector<double>& channel : change)
+      for (double& d : channel) d *= shift[static_cast<Eigen::Index>(j)];
+    all.push_back(whitened(change));
   }
-  of_shifts_ = ShiftWhitening(partition_.stretches, of_shifts);
+  return all;
 }
 
 void Evidence::leave_out_drive(std::size_t axis) {
@@ -413,12 +416,17 @@ bool Evidence::keep_comparable(std::size_t channel, std::vector<double>& change)
   return any != 0;
 }
 
-Column Evidence::whiten(const SeriesOfChannels& change) const {
+Column::Channels Evidence::whitened(const SeriesOfChannels& change) const {
   Column::Channels column(change.size());
   for (std::size_t c = 0; c < change.size(); ++c) {
     std::vector<double> d = change[c];
     if (keep_comparable(c, d)) column[c] = whiten(c, d);
   }
+  return column;
+}
+
+Column Evidence::whiten(const SeriesOfChannels& change) const {
+  Column::Channels column = whitened(change);
   of_shifts_.apply(column);
   return column;
 }

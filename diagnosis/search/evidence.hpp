@@ -6,7 +6,7 @@
 // needs are products of such columns, kept per block of the partition: from them come chi-square on
 // fitted and held-out laps, normal equations, gains per condition and resampled laps.
 // Shifts of the piece from lap to lap, as large as the rounding of encoders makes them, are
-// whitened in addition (lap_shifts.hpp).
+// whitened in addition (lap_shifts.hpp), and so is what forces do that only a healthy run tells of.
 //
 // Only samples that can be compared count (comparable.hpp), none outside every stretch, not what an
 // axis does in one lap and not in another (lap_events.hpp), and not moments at which the rounding
@@ -163,6 +163,8 @@ class Evidence {
     return role == Role::both || block.held_out == (role == Role::held_out);
   }
   std::vector<float> whiten(std::size_t channel, const std::vector<double>& series) const;
+  /// Sample by sample, whatever laps are shifted by.
+  Column::Channels whitened(const SeriesOfChannels& change) const;
   /// Of what can be compared of a channel.
   double rms_of(const std::vector<double>& series, std::size_t channel, Role role) const;
   /// Of the variance of a channel's noise: what the steps of the signal as recorded make, 0 .. 1.
@@ -178,7 +180,8 @@ class Evidence {
   void leave_out(const std::vector<LapEvent>& events);
   void leave_out_undecided(const SeriesOfChannels& rounding);
   void count_valid();
-  void whiten_shifts(const Eigen::Vector3d& shift);
+  /// Of a standard deviation of each shift of the piece.
+  std::vector<Column::Channels> whitened_shifts(const Eigen::Vector3d& shift) const;
   /// Says nothing of samples that cannot be compared.
   void mask(SeriesOfChannels& series) const;
   /// Adds the products in one block and channel.
@@ -196,6 +199,7 @@ class Evidence {
   std::vector<LapEvent> events_;
   SeriesOfChannels difference_;              ///< from the declared machine, without drifts
   std::vector<SeriesOfChannels> per_shift_;  ///< of the piece; empty without a probe
+  std::vector<SeriesOfChannels> of_forces_;  ///< Replica::of_unknown_forces()
   double noise_scale_;
   std::vector<double> form_;
   Coloured coloured_ = Coloured::deviation;

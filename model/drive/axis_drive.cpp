@@ -424,6 +424,15 @@ double AxisDriveOf<Real>::known(double KnownForce::*force, double loop) const {
   return std::lerp(force_before_.*force, force_told_.*force, loop / kDriveLoopSteps);
 }
 
+/// On the load, in the middle of a plant step.
+template <class Real>
+Real AxisDriveOf<Real>::told_load_force() const {
+  const double loop = loop_ + (plant_step_ + 0.5) / kPlantStepsPerLoop;
+  Real force = load_told_before_ + loop / kDriveLoopSteps * (load_told_ - load_told_before_);
+  if (force_known_) force += known(&KnownForce::applied, loop);
+  return force;
+}
+
 template <class Real>
 void AxisDriveOf<Real>::move_plant() {
   Real force = force_;
@@ -438,10 +447,10 @@ void AxisDriveOf<Real>::move_plant() {
     set_lane(force, i, signal.force);
   });
   if (uneven_) force += force_of_unevenness();
-  if (force_known_)
-    load_force_ = known(&KnownForce::applied, loop_ + (plant_step_ + 0.5) / kPlantStepsPerLoop);
+  const bool told = force_known_ || load_told_of_;
+  if (told) load_force_ = told_load_force();
   load_.each_active([&](Chain<LoadForcePort>& chain, std::size_t i) {
-    LoadForcePort::Signal<double> signal{force_known_ ? lane(load_force_, i) : 0};
+    LoadForcePort::Signal<double> signal{told ? lane(load_force_, i) : 0};
     chain.step(signal, {moment(kPlantTime, kPlantStepsPerLoop, plant_step_), lane(x_load_, i),
                         lane(v_load_, i), motions(i)});
     set_lane(load_force_, i, signal.force);

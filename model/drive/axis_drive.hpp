@@ -210,6 +210,14 @@ class AxisDriveOf {
     force_known_ = true;
   }
 
+  /// A further force on the load at the end of the coming cycle, another one for every lane; as
+  /// above.
+  void tell_load_force(const Real& force) {
+    load_told_before_ = load_told_of_ ? load_told_ : force;
+    load_told_ = force;
+    load_told_of_ = true;
+  }
+
   /// Takes what is measured for the set-point: braking after a following error starts where the
   /// axis is, not where it was told to be.
   void follow_up();
@@ -235,6 +243,7 @@ class AxisDriveOf {
   void shape(Setpoint& setpoint, Real acceleration, int step);
   Real control(const Setpoint& now, const Setpoint& next);
   double known(double KnownForce::*force, double loop) const;
+  Real told_load_force() const;
   void sample(const Setpoint& now, Real measured);
   /// One number of the sampled controllers.
   template <class F>
@@ -302,6 +311,8 @@ class AxisDriveOf {
   AxisVector told_position_{}, told_velocity_{}, before_position_{}, before_velocity_{};
   bool force_known_ = false;  ///< tell_force() was called
   KnownForce force_told_, force_before_;
+  bool load_told_of_ = false;  ///< tell_load_force() was called
+  Real load_told_{}, load_told_before_{};
   PerLane<Real, Motions<double>> motions_{};
   FrictionOf<Real> friction_, motor_friction_;
   VelocityObserverOf<Real> observer_;

@@ -439,14 +439,24 @@ void expect_lanes_as_alone(bool two_masses, bool sampled) {
     together.push_back(drive(i));
   }
   AxisDriveLanes lanes(std::move(together));
+  const auto load_force = [](std::size_t i, int k) {
+    return 10 * std::sin(0.03 * k + static_cast<double>(i));
+  };
+  const auto of_lanes = [](auto&& f) {
+    Lanes all(0);
+    for (std::size_t i = 0; i < kLanes; ++i) set_lane(all, i, f(i));
+    return all;
+  };
   for (int k = 1; k <= 1000; ++k) {
     const double angle = 2 * kPi * k / 400;
     const double x = 2e-3 * (1 - std::cos(angle)), v = 2e-3 * 2 * kPi / 0.4 * std::sin(angle);
     const KnownForce known{.added = 30 * std::sin(0.05 * k), .applied = k % 100 < 50 ? 20.0 : 0};
     lanes.tell_force(known);
+    lanes.tell_load_force(of_lanes([&](std::size_t i) { return load_force(i, k); }));
     const AxisDriveLanes::Cycle cycles = lanes.follow({x, v});
     for (std::size_t i = 0; i < used; ++i) {
       alone[i].tell_force(known);
+      alone[i].tell_load_force(load_force(i, k));
       const AxisCycle cycle = alone[i].follow({x, v});
       ASSERT_EQ(lane(cycles.measured, i), cycle.measured) << "lane " << i << ", cycle " << k;
       ASSERT_EQ(lane(cycles.second, i), cycle.second) << "lane " << i << ", cycle " << k;
@@ -490,6 +500,20 @@ TEST(AxisDrive, AnswersAForceFromOutsideAsItsTransferFunctionSays) {
     EXPECT_NEAR(std::abs(seen / answer), 1, 0.01) << f;
     EXPECT_NEAR(std::arg(seen / answer), 0, 0.01) << f;
   }
+}
+
+TEST(AxisDrive, IsMovedByALoadForceAsByAnAppliedOne) {
+  AxisDrive a{AxisParams{}}, b{AxisParams{}};
+  double farthest = 0;
+  for (int k = 1; k <= 500; ++k) {
+    const double force = 100 * std::sin(0.05 * k);
+    a.tell_force({.applied = force});
+    b.tell_load_force(force);
+    const double moved = a.hold().measured;
+    EXPECT_NEAR(b.hold().measured, moved, 1e-15);
+    farthest = std::max(farthest, std::abs(moved));
+  }
+  EXPECT_GT(farthest, 1e-7);
 }
 
 TEST(AxisDrive, TakesBackWhatIsAddedToItsForce) {
