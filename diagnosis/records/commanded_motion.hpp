@@ -27,7 +27,7 @@ namespace vcnc {
 /// (search/unknown_force.hpp), and how fast the healthy machine was.
 struct UnknownForce {
   std::vector<double> force;     ///< one per sample [N or N m]; empty: none
-  std::vector<double> velocity;  ///< of the load; empty: the force is taken as it comes
+  std::vector<double> velocity;  ///< as measured; empty: the force is taken as it comes
 };
 
 struct CommandedMotion {

@@ -105,7 +105,7 @@ class Rest {
 ///
 ///   v0 - v = tau a0,
 ///
-/// so tau comes from the mean products of both sides with a0, over some 20 ms.
+/// so tau comes from the mean products of both sides with a0, over some 50 ms.
 template <class Real>
 class LateForce {
  public:
@@ -120,7 +120,7 @@ class LateForce {
   bool lasts(std::size_t cycle) const {
     return !some() || of_.force[cycle] == of_.force[cycle - 1];
   }
-  /// At the end of a cycle, of a drive that was at these positions at the ends of those before.
+  /// At the end of a cycle, of a drive that measured these positions at the ends of those before.
   Real at(std::size_t cycle, const Real& position, const Real& before) {
     Real force{};
     const bool moves = cycle > 1 && !of_.velocity.empty();
@@ -137,9 +137,9 @@ class LateForce {
 
  private:
   static constexpr double kCycle = 1e-3;  // [s]
-  static constexpr double kKept = 0.95;   // from cycle to cycle
+  static constexpr double kKept = 0.98;   // from cycle to cycle
   static constexpr double kMost = 20;     // cycles
-  static constexpr double kLeast = 1e-3;  // of the largest square of a0
+  static constexpr double kLeast = 0.2;   // of the largest square of a0
 
   /// Of velocity within a cycle.
   double gain(std::size_t cycle) const { return of_.velocity[cycle] - of_.velocity[cycle - 1]; }
@@ -179,17 +179,16 @@ std::vector<AxisReplay> replay_lanes(AxisDriveOf<Real>& drive, std::size_t axis,
   Rest<Real> rest;
   LateForce<Real> unknown(motion.unknown[axis]);
   AxisCycleOf<Real> cycle;
-  for (std::size_t n = 0; n < lanes; ++n)
-    set_lane(cycle.truth.back(), n, start_position(variants[n].actual, kSeed)[axis]);
-  Real before = cycle.truth.back();
+  for (std::size_t n = 0; n < lanes; ++n) set_lane(cycle.measured, n, commands.start()[axis]);
+  Real before = cycle.measured;
   for (std::size_t k = 1; k < cycles; ++k) {
     const Command command = commands.at(k);
     if (rests && rest.lasts(command, axis) && unknown.lasts(k)) {
       drive.rest();
     } else {
       if (unknown.some()) {
-        drive.tell_load_force(unknown.at(k, cycle.truth.back(), before));
-        before = cycle.truth.back();
+        drive.tell_load_force(unknown.at(k, cycle.measured, before));
+        before = cycle.measured;
       }
       drive.tell_commands(command.position, command.velocity);
       if (!known.empty()) drive.tell_force(known[k]);

@@ -208,9 +208,9 @@ void MachineReplica::apply(const PerAxis<std::vector<double>>& unknown) {
     UnknownForce& of = motion_.unknown[axis];
     if (of.force.empty()) return;
     const AxisReplay replay = replay_axis(h.machine, h.actual, axis, motion_);
-    of.velocity.assign(replay.cycles(), 0.0);
+    of.velocity.assign(replay.measured.size(), 0.0);
     for (std::size_t k = 1; k < of.velocity.size(); ++k)
-      of.velocity[k] = (*replay.end_of(k) - *replay.end_of(k - 1)) / kCycleTime;
+      of.velocity[k] = (replay.measured[k] - replay.measured[k - 1]) / kCycleTime;
   });
   anchored_.clear();
   anchor(declared_);
