@@ -21,6 +21,8 @@ constexpr double kAsGood = 0.99;          ///< part of a gain that is as much be
 constexpr std::size_t kAlternatives = 1;  ///< other beginnings
 constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to look for another one
 constexpr double kHalf = 0.5;  ///< of what is left: for a further effect than few, or another one
+/// Times what was to be explained that two effects of one drive make each and take back together.
+constexpr double kCancels = 9;
 constexpr double kClearlySimpler = 0.5;  ///< numbers
 constexpr double kPartInALine = 0.25;  ///< of the least gain: less, and a wave is not worth a trial
 constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
@@ -146,11 +148,30 @@ class Search {
       FittedMachine trial =
           fitted_with(now, contenders[i],
                       i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
-      if (now.held_out - trial.held_out > contenders[i].needed) {
+      if (now.held_out - trial.held_out > contenders[i].needed && !cancels(trial)) {
         now = best_of_as_good(now, std::move(trial), contenders, i, contest);
         return true;
       }
       evidence_.anchor(now.machine);
+    }
+    return false;
+  }
+
+  /// Whether two effects of one place are each far more than what was to be explained: what they
+  /// explain is what they differ by, and the rest is anybody's.
+  bool cancels(const FittedMachine& m) const {
+    const double much =
+        kCancels * std::max(rules_.excess(result_.base.held_out), options_.least_gain);
+    const auto place = [&](const AddedEffect& a) { return candidates_[a.candidate].place; };
+    std::set<std::string> places;
+    for (std::size_t i = 0; i < m.added.size(); ++i) {
+      const bool alone = std::count_if(m.added.begin(), m.added.end(), [&](const AddedEffect& a) {
+                           return place(a) == place(m.added[i]);
+                         }) == 1;
+      if (alone) continue;
+      const FittedMachine less = taken_out(m, i, Common::held);
+      const double gain = evidence_.chi2(less.residual, Role::held_out) - m.held_out;
+      if (gain > much && !places.insert(place(m.added[i])).second) return true;
     }
     return false;
   }
@@ -171,7 +192,8 @@ class Search {
       const bool of_one_kind = other->released.empty() == contenders[than].released.empty();
       const double clearly = std::max(more * options_.class_gain,
                                       of_one_kind ? kHalf * rules_.excess(trial.held_out) : 0);
-      if (counted(instead, contest) < counted(trial, contest) + clearly) continue;
+      if (counted(instead, contest) < counted(trial, contest) + clearly || cancels(instead))
+        continue;
       trial = std::move(instead);
       numbers = other->numbers.size();
     }

@@ -468,6 +468,25 @@ TEST(Selection, BesideAnotherOfItsDriveAnEffectMustExplainMoreOfWhatIsLeft) {
       }
 }
 
+TEST(Selection, TwoOfOneDriveThatTakeEachOtherBackAreNotTold) {
+  // What there is, the fourth wave, is what two differ by that make the third one.
+  const char *first = "effects.X.load_play.width_um", *both = "effects.X.backlash.gap_um";
+  Record record = toy::commands(1000, 4);
+  WaveReplica replica(record.samples(), {{first, {1, 0}}, {both, {-1, 0.2}}});
+  read(record, replica, {}, 23);
+  std::vector<double>& reading = record.signals.back().value;
+  for (std::size_t k = 0; k < reading.size(); ++k)
+    reading[k] += 1e-6 * std::sin(2 * kPi * 4 * static_cast<double>(k) / 1000);
+  std::vector<Candidate> all = replica.candidates();
+  for (const char* place : {"X", "Y"}) {
+    all[0].place = "X";
+    all[1].place = place;
+    Evidence evidence(record, replica, {});
+    const SelectionResult result = select_effects_of(evidence, {}, all, {}, {});
+    EXPECT_EQ(result.found.added.size() == 2, all[1].place == "Y");
+  }
+}
+
 TEST(Selection, ManyThatDoALittleEachAreNotTold) {
   const std::vector<const char*> keys{"effects.X.load_play.width_um",
                                       "effects.Y.load_play.width_um",
