@@ -193,7 +193,14 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
 
 MachineReplica::~MachineReplica() = default;
 
+bool MachineReplica::knows_forces() const {
+  return std::any_of(motion_.unknown.begin(), motion_.unknown.end(),
+                     [](const UnknownForce& of) { return !of.force.empty(); });
+}
+
 void MachineReplica::apply(const PerAxis<std::vector<double>>& unknown) {
+  const auto is_none = [](const std::vector<double>& force) { return force.empty(); };
+  if (!knows_forces() && std::all_of(unknown.begin(), unknown.end(), is_none)) return;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     motion_.unknown[axis] = {};
     if (!unknown[axis].empty())
@@ -423,6 +430,7 @@ std::vector<std::vector<double>> MachineReplica::rounding(const Machine& machine
 
 std::vector<SeriesOfChannels> MachineReplica::of_unknown_forces() const {
   std::vector<SeriesOfChannels> all;
+  if (!knows_forces()) return all;
   const Hypothesis declared = hypothesis_of(declared_);
   const AxisReplays axes = axes_of(declared);
   const Prediction before = predict(declared, axes);

@@ -88,6 +88,7 @@ class MachineReplica : public Replica {
   AxisReplay replayed(const Hypothesis& hypothesis, std::size_t axis) const;
   void sample_as_recorded(AxisReplay& replay) const;
   Prediction predict(const Hypothesis& hypothesis, const AxisReplays& axes) const;
+  bool knows_forces() const;  ///< of some axis, by apply()
   Prediction assembled(const AxisReplays& axes, const Deflections& reading) const;
   Deflections off_record(const Deflections& reading) const;
   std::vector<double> as_recorded(const std::vector<double>& per_cycle) const;
