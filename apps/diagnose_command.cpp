@@ -141,19 +141,40 @@ int compare_models(const DiagnoseOptions& options, const Record& record, const M
   return stop_requested() ? kExitInterrupted : kExitOk;
 }
 
-/// Whether a record of single axes has nothing at all of the axis that a candidate is of. Where the
-/// probe was read, an axis that stands shows, too.
-bool is_of_unrecorded_axis(const Candidate& candidate, const Record& record) {
+/// Whether a place is an axis of which a record of single axes has nothing at all. Where the probe
+/// was read, an axis that stands shows, too.
+bool is_unrecorded_axis(const std::string& place, const Record& record) {
   for (const MeasuredSignal& s : record.signals)
-    if (s.kind == SignalKind::deflection || candidate.place == kAxisNames[s.axis]) return false;
-  return std::find(kAxisNames.begin(), kAxisNames.end(), candidate.place) != kAxisNames.end();
+    if (s.kind == SignalKind::deflection || place == kAxisNames[s.axis]) return false;
+  return std::find(kAxisNames.begin(), kAxisNames.end(), place) != kAxisNames.end();
+}
+
+/// "Y" of "effects.Y.coulomb.level_N".
+std::string place_of_key(const std::string& key) {
+  const std::size_t from = key.find('.') + 1;
+  return key.substr(from, key.find('.', from) - from);
+}
+
+/// Of an axis that is not recorded nothing can be held against the record.
+void check_recorded(const std::vector<std::string>& suspects, const std::vector<Candidate>& all,
+                    const std::vector<std::string>& numbers, const Record& record) {
+  for (const std::string& suspect : suspects) {
+    std::vector<std::string> places;
+    for (const Candidate& c : all)
+      if (is_suspected({suspect}, c)) places.push_back(c.place);
+    for (const std::string& key : numbers)
+      if (is_suspected({suspect}, key)) places.push_back(place_of_key(key));
+    if (!places.empty() && std::all_of(places.begin(), places.end(), [&](const std::string& place) {
+          return is_unrecorded_axis(place, record);
+        }))
+      throw InputError(fmt::format("--suspect: \"{}\": {} holds nothing of {}", suspect,
+                                   record.source, places.front()));
+  }
 }
 
 std::vector<Candidate> candidates_of(const DiagnoseOptions& options, const Record& record,
                                      const Machine& declared) {
   std::vector<Candidate> all = candidates(declared);
-  if (options.suspects.empty())
-    std::erase_if(all, [&](const Candidate& c) { return is_of_unrecorded_axis(c, record); });
   for (const std::string& effect : options.without)
     if (std::erase_if(all, [&](const Candidate& c) { return c.effect == effect; }) == 0)
       throw InputError(
@@ -162,7 +183,10 @@ std::vector<Candidate> candidates_of(const DiagnoseOptions& options, const Recor
           "an axis in front");
   std::vector<std::string> numbers;
   for (const FreedNumber& n : nuisances(declared)) numbers.push_back(n.number.key);
-  return suspected(std::move(all), numbers, options.suspects);
+  check_recorded(options.suspects, all, numbers, record);
+  all = suspected(std::move(all), numbers, options.suspects);
+  std::erase_if(all, [&](const Candidate& c) { return is_unrecorded_axis(c.place, record); });
+  return all;
 }
 
 /// `seen` becomes what the diagnosis was made on: in differential mode the record less the healthy

@@ -89,7 +89,10 @@ void write_record(const Record& record, const std::filesystem::path& path) {
   bool written = false;
   {
     Handle file(H5Fcreate(part.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
-    if (!file.ok()) refuse(path, "the record cannot be created");
+    if (!file.ok())
+      refuse(path, path.has_parent_path() && !std::filesystem::is_directory(path.parent_path())
+                       ? "there is no folder " + path.parent_path().string()
+                       : "the record cannot be created");
     std::string warnings;
     for (const std::string& w : record.warnings) warnings += one_line(w) + "\n";
     written = write(file, "format", std::string(kRecordFormat)) &&

@@ -73,6 +73,28 @@ TEST(Diagnose, ExplainsWithIntervalAndFigures) {
   }
 }
 
+/// Two effects and a wave that nothing explains: a twentieth of all, 3 % of the noise.
+TEST(Diagnose, MoreThanAFewChangesMustLeaveNextToNothing) {
+  Record record = measured(toy::machine({{"effects.geometry.squareness.xy_urad", 5.3},
+                                         {"effects.X.coulomb.level_N", 1.8}}),
+                           6);
+  std::vector<double>& reading = record.signals.back().value;
+  for (std::size_t k = 0; k < reading.size(); ++k)
+    reading[k] += 42e-9 * std::sin(2 * kPi * 29 * static_cast<double>(k) / 1000);
+  toy::ToyReplica replica(record);
+  DiagnosisOptions options;
+  const auto verdict = [&] {
+    const Diagnosis d = diagnose({record, replica, {}, toy::candidates()}, options);
+    EXPECT_EQ(d.effects.size(), 2U) << to_text(d);
+    EXPECT_GT(d.explained_share, 0.9);
+    EXPECT_LT(d.explained_share, 0.98);
+    return d.verdict;
+  };
+  EXPECT_EQ(verdict(), DiagnosisVerdict::explained);
+  options.few_effects = 1;
+  EXPECT_EQ(verdict(), DiagnosisVerdict::partly);
+}
+
 /// An axis with play that turns over within `speed` where the model's does within 1 mm/s.
 Diagnosis of_play_that_turns_over_within(double speed, const std::vector<std::string>& suspects) {
   Record record = measured({}, 5);

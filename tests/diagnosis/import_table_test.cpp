@@ -534,6 +534,15 @@ TEST_F(RecordFile, AnyHdf5FileIsATableOfItsDataSets) {
   EXPECT_EQ(again.signals[0].value, record.signals[1].value);
 }
 
+TEST_F(RecordFile, AFolderThatIsNotThereIsSaid) {
+  try {
+    write_record(imported(sound_map()), folder_ / "nowhere/run.h5");
+    FAIL();
+  } catch (const MeasurementError& e) {
+    EXPECT_NE(std::string(e.what()).find("there is no folder"), std::string::npos) << e.what();
+  }
+}
+
 TEST_F(RecordFile, AChangedOrForeignFileIsRefused) {
   const std::string file = folder_ / "run.h5";
   write_record(imported(sound_map()), file);

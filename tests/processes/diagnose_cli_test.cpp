@@ -111,6 +111,10 @@ TEST_F(DiagnoseCli, OnlyAxesOfTheRecordAreCandidatesAndARunIsNoReferenceOfItself
   EXPECT_EQ(said.out.find("The reference run"), std::string::npos);
   EXPECT_EQ(itself.out.find("declared otherwise"), std::string::npos);
 
+  const std::string of_y = " --map " + (scratch_ / "axis.toml") + " --suspect ";
+  for (const char* suspect : {"Y.backlash", "axes.Y.load_kg"})
+    expect_refused("diagnose " + (scratch_ / "axis.csv") + of_y + suspect, "holds nothing of Y");
+
   // A test run of another machine.
   write_text(scratch_ / "other.toml",
              read_text(scratch_ / "machine.toml") + "\n[axes.Y]\nkv_per_s = 33\n");
