@@ -14,8 +14,8 @@ namespace {
 constexpr int kRounds = 5;
 constexpr double kReach = 5e-3;     // of the mean to either side [s]
 constexpr double kStanding = 1e-4;  // of the highest speed
-/// Part of the mean square of what the position is off that may be left.
-constexpr double kMostLeft = 0.8;
+/// Part of the mean square of what the position is off that may be left; after one turn.
+constexpr double kMostLeft = 0.8, kMostLeftAtFirst = 0.9;
 
 /// Every sample within a lap becomes the mean of all laps that do the same.
 void take_means_of_laps(const std::vector<Stretch>& stretches, std::vector<double>& series) {
@@ -109,11 +109,10 @@ ForceOfAxes unknown_force(const Record& healthy, const Machine& declared) {
   ForceOfAxes force, best;
   if (record.stretches.empty()) return best;
   MachineReplica replica(record, declared, std::nullopt);
-  const std::vector<std::size_t> axes = told_axes(record, replica);
-  if (axes.empty()) return best;
+  std::vector<std::size_t> axes = told_axes(record, replica);
   PerAxis<double> at_first{}, least{};
   const auto reach = static_cast<std::size_t>(std::round(kReach / record.period));
-  for (int round = 0; round <= kRounds; ++round) {
+  for (int round = 0; round <= kRounds && !axes.empty(); ++round) {
     const Prediction predicted = replica.predict(declared);
     const auto off = [&](SignalKind kind, std::size_t axis) {
       const std::vector<ComparedChannel>& all = replica.channels();
@@ -135,10 +134,14 @@ ForceOfAxes unknown_force(const Record& healthy, const Machine& declared) {
       force[axis].resize(more.size(), 0.0);
       for (std::size_t k = 0; k < more.size(); ++k) force[axis][k] -= more[k];
     }
-    replica.apply(force);
+    const double most = round == 0 ? 1 : round == kRounds ? kMostLeft : kMostLeftAtFirst;
+    std::erase_if(axes, [&](std::size_t axis) {
+      const bool no_force = least[axis] > most * at_first[axis];
+      if (no_force) best[axis].clear(), force[axis].clear();
+      return no_force;
+    });
+    if (round < kRounds) replica.apply(force);
   }
-  for (const std::size_t axis : axes)
-    if (least[axis] > kMostLeft * at_first[axis]) best[axis].clear();
   return best;
 }
 
