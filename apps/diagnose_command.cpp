@@ -122,12 +122,7 @@ bool same_values(const Record& a, const Record& b) {
 std::optional<HealthyRun> reference_run(const DiagnoseOptions& options, const Machine& declared) {
   if (options.reference.empty()) return std::nullopt;
   const Record record = load_record(options.reference, options.map, options.model);
-  const auto replica = replica_of(record, declared);
-  ForceOfAxes unknown = unknown_force(record, declared);
-  replica->apply(unknown);
-  HealthyRun healthy = healthy_run(record, *replica, declared);
-  healthy.unknown = std::move(unknown);
-  return healthy;
+  return healthy_run_with_forces(record, *replica_of(record, declared), declared);
 }
 
 int compare_models(const DiagnoseOptions& options, const Record& record, const Machine& declared) {

@@ -201,6 +201,15 @@ HealthyRun healthy_run(const Record& record, Replica& replica, const Machine& de
           replica.predict(machine)};
 }
 
+HealthyRun healthy_run_with_forces(const Record& record, MachineReplica& replica,
+                                   const Machine& declared) {
+  ForceOfAxes unknown = unknown_force(record, declared);
+  replica.apply(unknown);
+  HealthyRun run = healthy_run(record, replica, declared);
+  run.unknown = std::move(unknown);
+  return run;
+}
+
 bool same_program(const Record& now, const Record& healthy) {
   return std::none_of(now.stretches.begin(), now.stretches.end(),
                       [&](const Stretch& s) { return partners(now, s, healthy).empty(); });

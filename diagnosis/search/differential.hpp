@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "diagnosis/records/record.hpp"
+#include "diagnosis/replica/machine_replica.hpp"
 #include "diagnosis/replica/replica.hpp"
 #include "diagnosis/search/lap_events.hpp"
 #include "diagnosis/search/unknown_force.hpp"
@@ -43,6 +44,10 @@ struct HealthyRun {
   ForceOfAxes unknown{};  ///< that the replica was given
 };
 HealthyRun healthy_run(const Record& record, Replica& replica, const Machine& declared);
+/// The same with the forces that only this run tells (unknown_force.hpp), which its replica is
+/// given and every replica that is held against it must be, as less_healthy() has them.
+HealthyRun healthy_run_with_forces(const Record& record, MachineReplica& replica,
+                                   const Machine& declared);
 
 /// Whether every motion of a run has a partner in the healthy one.
 bool same_program(const Record& now, const Record& healthy);

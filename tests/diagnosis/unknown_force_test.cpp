@@ -171,11 +171,8 @@ Diagnosis change(const Machine& healthy, const Machine& now, bool with_unknown =
   const Record reference = recorded(healthy, 6), record = recorded(now, 7);
   MachineReplica of_reference(reference, declared(), std::nullopt),
       replica(record, declared(), std::nullopt);
-  ForceOfAxes unknown;
-  if (with_unknown) unknown = unknown_force(reference, declared());
-  of_reference.apply(unknown);
-  HealthyRun run = healthy_run(reference, of_reference, declared());
-  run.unknown = unknown;
+  const HealthyRun run = with_unknown ? healthy_run_with_forces(reference, of_reference, declared())
+                                      : healthy_run(reference, of_reference, declared());
   const DifferentialRecord difference = less_healthy(record, run);
   replica.apply(difference.unknown);
   std::vector<Candidate> all = candidates(declared());
