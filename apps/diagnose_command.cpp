@@ -144,9 +144,10 @@ bool is_unrecorded_axis(const std::string& place, const Record& record) {
   return std::find(kAxisNames.begin(), kAxisNames.end(), place) != kAxisNames.end();
 }
 
-/// "Y" of "effects.Y.coulomb.level_N".
+/// "Y" of "effects.Y.coulomb.level_N"; a place, where it is no key.
 std::string place_of_key(const std::string& key) {
   const std::size_t from = key.find('.') + 1;
+  if (from == 0) return key;
   return key.substr(from, key.find('.', from) - from);
 }
 
@@ -156,7 +157,7 @@ void check_recorded(const std::vector<std::string>& suspects, const std::vector<
   for (const std::string& suspect : suspects) {
     std::vector<std::string> places;
     for (const Candidate& c : all)
-      if (is_suspected({suspect}, c)) places.push_back(c.place);
+      if (is_suspected({suspect}, c)) places.push_back(place_of_key(c.place));
     for (const std::string& key : numbers)
       if (is_suspected({suspect}, key)) places.push_back(place_of_key(key));
     if (!places.empty() && std::all_of(places.begin(), places.end(), [&](const std::string& place) {
