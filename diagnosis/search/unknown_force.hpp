@@ -9,9 +9,9 @@
 //   F(t) := F(t) - mean over laps of (force of the drive - that of the model under F), over 10 ms
 //
 // in turns from nought, while the axis moves; where it stands, as before. A force is believed only
-// where it explains another signal, which it was not taken from: it must halve the mean square of
-// what the position is off the model. So none is found where no force is recorded, where the record
-// has a known force, or where the model is off for other reasons (a controller at another rate).
+// where it explains another signal, which it was not taken from: a fifth of the mean square of what
+// the position is off the model. So none is found where no force is recorded, where the record has
+// a known force, or where the model is off for other reasons (a controller at another rate).
 #pragma once
 
 #include <vector>
