@@ -104,6 +104,18 @@ void tell_unknown_forces(const ForceOfAxes& unknown, std::vector<std::string>& n
   }
 }
 
+void tell_lags(const Machine& declared, const Machine& healthy, std::vector<std::string>& notes) {
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const ServoParams &was = declared.axes[axis].servo, &is = healthy.axes[axis].servo;
+    if (is.position_lag == was.position_lag && is.velocity_lag == was.velocity_lag) continue;
+    notes.push_back(fmt::format(
+        "The controller of {} in the reference run is as with position_lag_us = {:.0f} and "
+        "velocity_lag_us = {:.0f}, declared are {:.0f} and {:.0f}; it counts so in this run, too.",
+        kAxisNames[axis], 1e6 * is.position_lag, 1e6 * is.velocity_lag, 1e6 * was.position_lag,
+        1e6 * was.velocity_lag));
+  }
+}
+
 void append_told(std::string sentence, std::vector<std::string>& warnings) {
   if (!sentence.empty()) warnings.push_back(std::move(sentence));
 }
@@ -205,6 +217,7 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
     seen = difference.record;
     replica.apply(difference.unknown);
     d = diagnose(of, difference, asked, keep_going);
+    tell_lags(declared, healthy->machine, d.notes);
     tell_unknown_forces(healthy->unknown, d.notes);
   } else {
     d = diagnose(of, asked, keep_going);

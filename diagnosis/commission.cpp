@@ -10,6 +10,8 @@
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/replica/model_comparison.hpp"
+#include "diagnosis/search/controller_check.hpp"
+#include "diagnosis/search/controller_lags.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/refit.hpp"
@@ -25,6 +27,7 @@ constexpr double kFixed = 1e12;  ///< precision of a number that stays
 /// form of the contact.
 constexpr double kShareOfMeasuring = 0.05;
 constexpr double kWellOff = 10;         // times the noise
+constexpr double kNothing = 1e-3;       // of a typical size
 constexpr double kNearlyAsGood = 0.95;  ///< of the most that one promises: as good
 
 /// Effects of an axis that are fitted together, or its lags.
@@ -68,7 +71,8 @@ std::vector<Candidate> lags(const Machine& declared) {
                                     .max = 5000,
                                     .one_sided = true}},
                        .shape = {},
-                       .family = Family::servo});
+                       .family = Family::servo,
+                       .of_loops = true});
   return all;
 }
 
@@ -159,9 +163,12 @@ class Commissioner {
         options_(options),
         keep_going_(keep_going),
         candidates_(of.candidates),
-        evidence_(of.record, of.replica, of.declared) {
+        evidence_(of.record, of.replica, of.declared),
+        controller_(of.record, of.replica.channels(), of.declared) {
     if (leaves_noise) evidence_.take_noise_from(*leaves_noise);
-    machine_ = fit_declared(evidence_, of.declared);
+    const Machine begun = with_lags_of(of.record, of.declared);
+    tell_lags(begun);
+    machine_ = fit_declared(evidence_, begun);
     for (Candidate& lag : lags(of.declared)) candidates_.push_back(std::move(lag));
   }
 
@@ -204,6 +211,18 @@ class Commissioner {
       for (std::size_t c = 0; c < candidates_.size(); ++c)
         if (candidates_[c].effect == effect && candidates_[c].place == place) all.push_back(c);
     return all;
+  }
+
+  void tell_lags(const Machine& m) {
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      const ServoParams &is = m.axes[axis].servo, &was = of_.declared.axes[axis].servo;
+      if (is.position_lag == was.position_lag && is.velocity_lag == was.velocity_lag) continue;
+      result_.notes.push_back(fmt::format(
+          "{}: by its controller's own signals, lag of the position loop {:.0f} -> {:.0f} us, of "
+          "the measured velocity {:.0f} -> {:.0f} us",
+          kAxisNames[axis], 1e6 * was.position_lag, 1e6 * is.position_lag, 1e6 * was.velocity_lag,
+          1e6 * is.velocity_lag));
+    }
   }
 
   double per_sample(const FittedMachine& m) const {
@@ -255,6 +274,28 @@ class Commissioner {
     return best;
   }
 
+  /// Whether the last of the added is nothing: what was gained is of the others.
+  bool is_as_declared(const FittedMachine& m) const {
+    const std::vector<FreedNumber>& numbers = m.added.back().numbers;
+    return std::all_of(numbers.begin(), numbers.end(), [&](const FreedNumber& n) {
+      return std::abs(n.value - number_of(of_.declared, n.number.key)) <
+             kNothing * std::abs(n.number.typical);
+    });
+  }
+
+  /// Whether the last of the added is a gain of which the controller's signals say that it is not.
+  bool stands_for_force(const FittedMachine& m) const {
+    const Candidate& last = candidates_[m.added.back().candidate];
+    if (!last.of_loops) return false;
+    Machine without = m.machine;
+    for (const FreeNumber& n : last.numbers)
+      move_number(without, n.key, number_of(of_.declared, n.key));
+    const auto axis = static_cast<std::size_t>(
+        std::find(kAxisNames.begin(), kAxisNames.end(), last.place) - kAxisNames.begin());
+    const auto b = controller_.of(axis, evidence_.predict(without), evidence_.predict(m.machine));
+    return b && b->contradicts();
+  }
+
   /// One after the other, the one first that promises most.
   void fit_best_of(std::vector<std::size_t> left, const std::string& place, double least_share,
                    const std::function<bool()>& go_on) {
@@ -268,7 +309,7 @@ class Commissioner {
       FittedMachine better = with_candidates(candidates_, machine_, {*best});
       converge(evidence_, better);
       if (!gains_enough(machine_, better, least_share)) return;
-      accept(std::move(better), place, told(candidates_[*best]));
+      if (!stands_for_force(better)) accept(std::move(better), place, told(candidates_[*best]));
       left.erase(best);
     }
   }
@@ -326,6 +367,7 @@ class Commissioner {
   const KeepGoing& keep_going_;
   std::vector<Candidate> candidates_;
   Evidence evidence_;
+  ControllerCheck controller_;
   FittedMachine machine_;  ///< added: what was found on the axis in work
   Commissioning result_;
 };

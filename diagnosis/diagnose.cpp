@@ -44,8 +44,7 @@ std::vector<double> forms_of(const Evidence& evidence, const DifferentialRecord&
   const std::vector<ComparedChannel>& channels = evidence.replica().channels();
   std::vector<double> forms(channels.size(), 0.0);
   for (std::size_t c = 0; c < channels.size(); ++c) {
-    if (channels[c].kind != SignalKind::deflection) continue;
-    const double changed = kChangeOfForm * difference.off[channels[c].axis] /
+    const double changed = kChangeOfForm * difference.off_in(channels[c]) /
                            (difference.noise_scale * evidence.noise().channels[c].rms);
     forms[c] = evidence.count(c, Role::held_out) * changed * changed;
   }
@@ -97,8 +96,8 @@ DiagnosisOptions fitting(DiagnosisOptions options, const Evidence& evidence,
     options.least_share = std::max(options.least_share, kShareOfChange);
     options.share_beside = std::max(options.share_beside, kShareBeside);
     options.form_of_channel = forms_of(evidence, *difference);
-    options.form_um = 1e6 * kChangeOfForm *
-                      std::hypot(difference->off[0], difference->off[1], difference->off[2]);
+    const auto off = [&](std::size_t c) { return difference->off_in({SignalKind::deflection, c}); };
+    options.form_um = 1e6 * kChangeOfForm * std::hypot(off(0), off(1), off(2));
   } else if (!left.empty()) {
     allow_for_form(evidence, left, options);
   }

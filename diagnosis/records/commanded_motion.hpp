@@ -26,8 +26,11 @@ namespace vcnc {
 /// A force on the load of an axis of which only a healthy run of the same motion tells
 /// (search/unknown_force.hpp), and how fast the healthy machine was.
 struct UnknownForce {
-  std::vector<double> force;     ///< one per sample [N or N m]; empty: none
+  std::vector<double> slow;      ///< means over 0.1 s, one per sample [N or N m]; empty: none
+  std::vector<double> quick;     ///< the rest: where friction turns over, not as it is declared
   std::vector<double> velocity;  ///< as measured; empty: the force is taken as it comes
+  /// Declared, of the machine that it was taken from [N or N m]; 0: it is no part of that.
+  double dry_friction = 0;
 };
 
 struct CommandedMotion {

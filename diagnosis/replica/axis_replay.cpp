@@ -105,20 +105,27 @@ class Rest {
 ///
 ///   v0 - v = tau a0,
 ///
-/// so tau comes from the mean products of both sides with a0, over some 50 ms.
+/// so tau comes from the mean products of both sides with a0, over some 50 ms. What dry friction
+/// does that its model has not grows with it.
 template <class Real>
 class LateForce {
  public:
-  explicit LateForce(const UnknownForce& of) : of_(of) {
+  LateForce(const UnknownForce& of, std::size_t axis, const PerLane<Real, AxisVariant>& variants)
+      : of_(of) {
+    for (std::size_t n = 0; n < kLanesOf<Real>; ++n) {
+      const double dry = variants[n].actual.effects.axis[axis].template get<Coulomb>().level;
+      times_[n] = of.dry_friction > 0 ? std::clamp(dry / of.dry_friction, 0.0, kMostTimes) : 1;
+    }
     double most = 0;
     for (std::size_t k = 1; k < of.velocity.size(); ++k)
       most = std::max(most, std::pow(gain(k), 2));
     least_ = kLeast * most;
   }
-  bool some() const { return !of_.force.empty(); }
+  bool some() const { return !of_.slow.empty(); }
   /// Whether it is the same at the end of a cycle as at its beginning.
   bool lasts(std::size_t cycle) const {
-    return !some() || of_.force[cycle] == of_.force[cycle - 1];
+    return !some() ||
+           (of_.slow[cycle] == of_.slow[cycle - 1] && of_.quick[cycle] == of_.quick[cycle - 1]);
   }
   /// At the end of a cycle, of a drive that measured these positions at the ends of those before.
   Real at(std::size_t cycle, const Real& position, const Real& before) {
@@ -130,7 +137,8 @@ class LateForce {
       const double v = (lane(position, n) - lane(before, n)) / kCycle;
       products_[n] = kKept * products_[n] + (moves ? (v0 - v) * a0 : 0);
       const double late = own_ > 0 ? products_[n] / (own_ + least_) : 0;
-      set_lane(force, n, told(static_cast<double>(cycle) - std::clamp(late, -kMost, kMost)));
+      const double then = static_cast<double>(cycle) - std::clamp(late, -kMost, kMost);
+      set_lane(force, n, times_[n] * told(then));
     }
     return force;
   }
@@ -140,20 +148,20 @@ class LateForce {
   static constexpr double kKept = 0.98;   // from cycle to cycle
   static constexpr double kMost = 20;     // cycles
   static constexpr double kLeast = 0.2;   // of the largest square of a0
+  static constexpr double kMostTimes = 3;
 
   /// Of velocity within a cycle.
   double gain(std::size_t cycle) const { return of_.velocity[cycle] - of_.velocity[cycle - 1]; }
   double told(double cycle) const {
-    const double last = static_cast<double>(of_.force.size() - 1),
-                 at = std::clamp(cycle, 0.0, last);
-    const auto i = static_cast<std::size_t>(at);
+    const double last = static_cast<double>(of_.slow.size() - 1), at = std::clamp(cycle, 0.0, last);
+    const auto i = static_cast<std::size_t>(at), next = std::min(i + 1, of_.slow.size() - 1);
     const double part = at - static_cast<double>(i);
-    return part > 0 ? std::lerp(of_.force[i], of_.force[i + 1], part) : of_.force[i];
+    return std::lerp(of_.slow[i] + of_.quick[i], of_.slow[next] + of_.quick[next], part);
   }
 
   const UnknownForce& of_;
   double least_ = 0, own_ = 0;
-  PerLane<Real, double> products_{};
+  PerLane<Real, double> products_{}, times_{};
 };
 
 /// Replays on any number of lanes with `per_cycle` truths; after_cycle(k) is called after each.
@@ -177,7 +185,7 @@ std::vector<AxisReplay> replay_lanes(AxisDriveOf<Real>& drive, std::size_t axis,
   const bool can_rest = drive.can_rest() && known.empty();
   bool rests = false;
   Rest<Real> rest;
-  LateForce<Real> unknown(motion.unknown[axis]);
+  LateForce<Real> unknown(motion.unknown[axis], axis, variants);
   AxisCycleOf<Real> cycle;
   for (std::size_t n = 0; n < lanes; ++n) set_lane(cycle.measured, n, commands.start()[axis]);
   Real before = cycle.measured;

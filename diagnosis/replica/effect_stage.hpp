@@ -50,6 +50,13 @@ constexpr std::string_view no_hypothesis() {
   return "";
 }
 
+/// What sets the loops and the set-points of a drive.
+template <class Effect>
+constexpr bool is_of_loops() {
+  return std::is_same_v<typename Effect::Port, ServoPort> ||
+         std::is_same_v<typename Effect::Port, SetpointPort>;
+}
+
 /// Calls f(effect, axis) for every effect of a machine; axis kAxisCount for those of no axis.
 template <class SomeEffects, class F>
 void for_each_effect_of(SomeEffects& effects, F&& f) {

@@ -6,6 +6,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "diagnosis/records/series.hpp"
 #include "diagnosis/replica/effect_stage.hpp"
 #include "diagnosis/search/candidate.hpp"
 #include "diagnosis/search/parallel.hpp"
@@ -16,6 +17,7 @@ namespace {
 
 constexpr double kCycleTime = 1e-3;     // [s]
 constexpr double kUnknownForce = 0.05;  // standard deviation, of a force that a healthy run tells
+constexpr std::size_t kSlowly = 50;     // of a mean to either side [cycles]
 constexpr std::size_t kAxisReplays = 6, kWatched = 1, kPoses = 4, kBalls = 8;
 
 /// The commands at 1 ms.
@@ -84,13 +86,6 @@ ServoParams follower(const MechanicsParams& m) {
   servo.integral_time = 5e-3;
   servo.feedback = ServoParams::Feedback::motor;
   return servo;
-}
-
-/// What sets the loops and the set-points of a drive says nothing of one that is followed.
-template <class Effect>
-constexpr bool is_of_loops() {
-  return std::is_same_v<typename Effect::Port, ServoPort> ||
-         std::is_same_v<typename Effect::Port, SetpointPort>;
 }
 
 /// a + factor b
@@ -195,16 +190,22 @@ MachineReplica::~MachineReplica() = default;
 
 bool MachineReplica::knows_forces() const {
   return std::any_of(motion_.unknown.begin(), motion_.unknown.end(),
-                     [](const UnknownForce& of) { return !of.force.empty(); });
+                     [](const UnknownForce& of) { return !of.slow.empty(); });
 }
 
 void MachineReplica::apply(const PerAxis<std::vector<double>>& unknown) {
   const auto is_none = [](const std::vector<double>& force) { return force.empty(); };
   if (!knows_forces() && std::all_of(unknown.begin(), unknown.end(), is_none)) return;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    motion_.unknown[axis] = {};
-    if (!unknown[axis].empty())
-      motion_.unknown[axis].force = at_cycles(unknown[axis], period_, motion_.known.size());
+    UnknownForce& of = motion_.unknown[axis] = {};
+    if (!unknown[axis].empty()) {
+      of.quick = at_cycles(unknown[axis], period_, motion_.known.size());
+      const double size = std::sqrt(mean_square(of.quick));
+      of.slow = moving_mean(of.quick, kSlowly);
+      for (std::size_t k = 0; k < of.slow.size(); ++k) of.quick[k] -= of.slow[k];
+      const double dry = actual(declared_).effects.axis[axis].get<Coulomb>().level;
+      if (dry > size) of.dry_friction = dry;
+    }
     axis_memory_[axis]->clear();
     watched_[axis]->clear();
   }
@@ -213,7 +214,7 @@ void MachineReplica::apply(const PerAxis<std::vector<double>>& unknown) {
   const Hypothesis h = hypothesis_of(declared_);
   parallel_for(kAxisCount, [&](std::size_t axis) {
     UnknownForce& of = motion_.unknown[axis];
-    if (of.force.empty()) return;
+    if (of.slow.empty()) return;
     const AxisReplay replay = replay_axis(h.machine, h.actual, axis, motion_);
     of.velocity.assign(replay.measured.size(), 0.0);
     for (std::size_t k = 1; k < of.velocity.size(); ++k)
@@ -230,6 +231,7 @@ MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine,
   for_each_effect_of(h.machine.effects, [&]<class Effect>(Effect& effect, std::size_t axis) {
     const bool stays =
         std::is_same_v<Effect, EncoderQuantisation> && encoders == Encoders::rounding;
+    // What sets loops and set-points says nothing of a drive that is followed.
     const bool unseen = is_of_loops<Effect>() && axis < kAxisCount && motion_.followed[axis];
     if ((is_chance<Effect>() && !stays) || unseen) effect = Effect();
   });
@@ -434,21 +436,25 @@ std::vector<SeriesOfChannels> MachineReplica::of_unknown_forces() const {
   const Hypothesis declared = hypothesis_of(declared_);
   const AxisReplays axes = axes_of(declared);
   const Prediction before = predict(declared, axes);
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    if (motion_.unknown[axis].force.empty()) continue;
+  const auto add = [&](std::size_t axis, std::vector<double> UnknownForce::*of, const char* part) {
     CommandedMotion motion = motion_;
-    for (double& f : motion.unknown[axis].force) f *= 1 + kUnknownForce;
+    for (double& f : motion.unknown[axis].*of) f *= 1 + kUnknownForce;
     AxisReplay replay = replay_axis(declared.machine, declared.actual, axis, motion);
     sample_as_recorded(replay);
     AxisReplays changed = axes;
     changed[axis] = std::make_shared<const AxisReplay>(std::move(replay));
     Hypothesis other = declared;
-    other.ball += "|more force on " + std::string(kAxisNames[axis]);
+    other.ball += part + std::string(kAxisNames[axis]);
     const Prediction after = predict(other, changed);
     SeriesOfChannels& change = all.emplace_back(channels_.size());
     for (std::size_t c = 0; c < channels_.size(); ++c)
       for (std::size_t k = 0; !after[c].shares(before[c]) && k < samples_; ++k)
         change[c].push_back(after[c][k] - before[c][k]);
+  };
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    if (motion_.unknown[axis].slow.empty()) continue;
+    add(axis, &UnknownForce::slow, "|more slow force on ");
+    add(axis, &UnknownForce::quick, "|more quick force on ");
   }
   return all;
 }

@@ -36,6 +36,7 @@ struct Candidate {
   /// frequency of a vibration, the time constant of a drift.
   std::vector<std::size_t> shape;  ///< indices into numbers
   Family family = Family::nc;      ///< of the effect
+  bool of_loops = false;  ///< it acts on gains or set-points of a drive (controller_check.hpp)
 
   std::string name() const { return place.empty() ? effect : place + "." + effect; }
 };

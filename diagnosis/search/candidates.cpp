@@ -59,7 +59,8 @@ void add_candidate(const EffectPlace& place, std::vector<Candidate>& all) {
   const std::vector<double> sizes = typical_sizes(at_nominal, components);
 
   Candidate candidate{
-      std::string(Effect::text.name), std::string(place.name), {}, {}, Effect::text.family};
+      std::string(Effect::text.name), std::string(place.name), {}, {}, Effect::text.family,
+      is_of_loops<Effect>()};
   bool acts = false;
   for (std::size_t c = 0; c < components.size(); ++c) {
     const EffectNumber& number = at_nominal[components[c].number];

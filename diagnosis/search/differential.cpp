@@ -11,7 +11,10 @@
 #include "diagnosis/records/any_record.hpp"
 #include "diagnosis/records/commanded_motion.hpp"
 #include "diagnosis/records/measured_table.hpp"
+#include "diagnosis/records/series.hpp"
 #include "diagnosis/records/signal_name.hpp"
+#include "diagnosis/search/controller_check.hpp"
+#include "diagnosis/search/controller_lags.hpp"
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/fitted_machine.hpp"
 #include "diagnosis/search/freed_number.hpp"
@@ -71,8 +74,9 @@ double deviation(const std::vector<double>& values) {
 }
 
 /// RMS of what the healthy machine is off the healthy run where it is told, per channel.
-PerAxis<double> leave_out_untold(Record& difference, const Record& now) {
-  PerAxis<double> off{};
+std::vector<std::pair<ComparedChannel, double>> leave_out_untold(Record& difference,
+                                                                 const Record& now) {
+  std::vector<std::pair<ComparedChannel, double>> off;
   for (MeasuredSignal& signal : difference.signals) {
     if (signal.kind != SignalKind::deflection) continue;
     const std::vector<double>& measured = now.find(signal.kind, signal.axis)->value;
@@ -87,7 +91,7 @@ PerAxis<double> leave_out_untold(Record& difference, const Record& now) {
       if (std::abs(d) > most) signal.value[k] = kMissing, ++left_out;
       if (std::abs(d) <= most) sum += d * d, n += 1;
     }
-    off[signal.axis] = n > 0 ? std::sqrt(sum / n) : 0;
+    off.emplace_back(ComparedChannel{signal.kind, signal.axis}, n > 0 ? std::sqrt(sum / n) : 0);
     if (left_out > kLeftOut * (n + left_out))
       difference.warnings.push_back(fmt::format(
           "{}: {:.0f} % of the readings are left out, since the model is far off the healthy run "
@@ -95,6 +99,31 @@ PerAxis<double> leave_out_untold(Record& difference, const Record& now) {
           signal_name(signal.kind, signal.axis), 100 * left_out / (n + left_out)));
   }
   return off;
+}
+
+/// What a force that only the healthy run tells, and that was taken from it, leaves of the signals
+/// of its drive: of the position, what no gain does (controller_check.hpp).
+void add_left_of_forces(const Record& now, DifferentialRecord& difference,
+                        const HealthyRun& healthy) {
+  SeriesOfChannels off(healthy.channels.size());
+  for (std::size_t c = 0; c < off.size(); ++c) {
+    const MeasuredSignal *was = now.find(healthy.channels[c].kind, healthy.channels[c].axis),
+                         *is = difference.record.find(healthy.channels[c].kind,
+                                                      healthy.channels[c].axis);
+    if (!was || healthy.channels[c].kind == SignalKind::deflection) continue;
+    for (std::size_t k = 0; k < was->value.size(); ++k)
+      off[c].push_back(was->value[k] - is->value[k]);
+  }
+  const ControllerCheck check(now, healthy.channels, healthy.machine);
+  for (std::size_t c = 0; c < off.size(); ++c) {
+    const ComparedChannel& channel = healthy.channels[c];
+    if (off[c].empty() || difference.unknown[channel.axis].empty()) continue;
+    if (channel.kind == SignalKind::position) {
+      const std::vector<double> of_gains = check.equation(channel.axis, off);
+      for (std::size_t k = 0; k < of_gains.size(); ++k) off[c][k] -= of_gains[k];
+    }
+    difference.off.emplace_back(channel, std::sqrt(mean_square(off[c])));
+  }
 }
 
 /// Without readings that are off by far more than most: moments of touching tell nothing of where
@@ -203,9 +232,10 @@ HealthyRun healthy_run(const Record& record, Replica& replica, const Machine& de
 
 HealthyRun healthy_run_with_forces(const Record& record, MachineReplica& replica,
                                    const Machine& declared) {
-  ForceOfAxes unknown = unknown_force(record, declared);
+  const Machine machine = with_lags_of(record, declared);
+  ForceOfAxes unknown = unknown_force(record, machine);
   replica.apply(unknown);
-  HealthyRun run = healthy_run(record, replica, declared);
+  HealthyRun run = healthy_run(record, replica, machine);
   run.unknown = std::move(unknown);
   return run;
 }
@@ -213,6 +243,12 @@ HealthyRun healthy_run_with_forces(const Record& record, MachineReplica& replica
 bool same_program(const Record& now, const Record& healthy) {
   return std::none_of(now.stretches.begin(), now.stretches.end(),
                       [&](const Stretch& s) { return partners(now, s, healthy).empty(); });
+}
+
+double DifferentialRecord::off_in(const ComparedChannel& channel) const {
+  for (const auto& [of, rms] : off)
+    if (of == channel) return rms;
+  return 0;
 }
 
 DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
@@ -271,6 +307,7 @@ DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     result.unknown[axis] = in_laps_of(now, healthy, healthy.unknown[axis]);
   result.off = leave_out_untold(result.record, now);
+  add_left_of_forces(now, result, healthy);
   if (fewest > 0) result.noise_scale = std::sqrt(1 + 1 / static_cast<double>(fewest));
   return result;
 }

@@ -9,8 +9,12 @@
 // healthy machine is off the healthy run by 20 times their roughness, as in the moment of touching
 // or while the drag on the ball turns over: there the model does not tell what a change does
 // either. The noise of the reference stays in: variances grow by 1 + 1/n for n laps.
+//
+// With its forces, the healthy run first tells the lags of its loops (controller_lags.hpp), then a
+// force that no model of its friction has (unknown_force.hpp).
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "diagnosis/records/record.hpp"
@@ -27,10 +31,14 @@ namespace vcnc {
 struct DifferentialRecord {
   Record record;
   double noise_scale = 1;  ///< of the standard deviation
-  PerAxis<double> off{};  ///< RMS of a reading of the probe less yhat in the healthy run, x y z [m]
+  /// RMS of what a signal is off yhat in the healthy run, of what may be otherwise another day:
+  /// readings of the probe, and where a force is unknown what is left of it in the drive's signals.
+  std::vector<std::pair<ComparedChannel, double>> off{};
   HealthyNoise noise{};
   ForceOfAxes unknown{};  ///< as in the healthy run
   Machine healthy;        ///< what the record is held against instead of the declared machine
+
+  double off_in(const ComparedChannel& channel) const;  ///< 0: nothing is known
 };
 
 /// A healthy run and the declared machine with the piece where it was clamped for that.

@@ -202,6 +202,8 @@ void fit_in_rounds(Evidence& evidence, FittedMachine& m, const std::vector<std::
 
 /// Tolerances from which on a declared number may stand for something that is missing.
 constexpr double kPulledFar = 1.5;
+/// The same, even where nothing else is left.
+constexpr double kPulledOut = 3;
 
 }  // namespace
 
@@ -350,10 +352,11 @@ void settle_in(Evidence& evidence, FittedMachine& m, const NoUse& no_use) {
   constexpr double kNoGainYet = std::numeric_limits<double>::infinity();
   anchor_at(evidence, m);
   fit_in_rounds(evidence, m, concerned(m), kNoGainYet, no_use);
-  const bool far =
-      std::any_of(m.nuisances.numbers.begin(), m.nuisances.numbers.end(),
-                  [](const FreedNumber& n) { return std::abs(n.pull()) > kPulledFar; });
-  if (far && m.held_out > no_use.little && m.held_out < no_use.much) {
+  double pulled = 0;
+  for (const FreedNumber& n : m.nuisances.numbers) pulled = std::max(pulled, std::abs(n.pull()));
+  const bool stands_in = pulled > kPulledOut,
+             may_gain = pulled > kPulledFar && m.held_out > no_use.little;
+  if ((stands_in || may_gain) && m.held_out < no_use.much) {
     FittedMachine anew = m;
     for (FreedNumber& n : anew.nuisances.numbers)
       if (n.tolerance > 0) n.value = n.centre;

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "diagnosis/search/contest.hpp"
+#include "diagnosis/search/controller_check.hpp"
 #include "diagnosis/search/detection_limits.hpp"
 #include "diagnosis/search/trial_values.hpp"
 #include "model/axes.hpp"
@@ -40,7 +41,8 @@ class Search {
         declared_(declared),
         candidates_(candidates),
         options_(options),
-        keep_going_(keep_going) {}
+        keep_going_(keep_going),
+        controller_(evidence.record(), evidence.replica().channels(), declared) {}
 
   SelectionResult run() {
     go("fitting the declared machine", 0);
@@ -148,11 +150,29 @@ class Search {
       FittedMachine trial =
           fitted_with(now, contenders[i],
                       i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
-      if (now.held_out - trial.held_out > contenders[i].needed && !cancels(trial)) {
+      if (now.held_out - trial.held_out > contenders[i].needed && holds_up(trial)) {
         now = best_of_as_good(now, std::move(trial), contenders, i, contest);
         return true;
       }
       evidence_.anchor(now.machine);
+    }
+    return false;
+  }
+
+  /// Whether its effects are told by what else is known of them than what they explain together.
+  bool holds_up(const FittedMachine& m) const { return !cancels(m) && !contradicts_controller(m); }
+
+  /// Whether the controller's own signals say that a gain is not what it is told to be: it stands
+  /// for a force (controller_check.hpp).
+  bool contradicts_controller(const FittedMachine& m) const {
+    for (std::size_t i = 0; i < m.added.size(); ++i) {
+      const Candidate& c = candidates_[m.added[i].candidate];
+      const auto name = std::find(kAxisNames.begin(), kAxisNames.end(), c.place);
+      if (!c.of_loops || name == kAxisNames.end()) continue;
+      const auto b =
+          controller_.of(static_cast<std::size_t>(name - kAxisNames.begin()),
+                         taken_out(m, i, Common::held).prediction, evidence_.predict(m.machine));
+      if (b && b->contradicts()) return true;
     }
     return false;
   }
@@ -192,7 +212,7 @@ class Search {
       const bool of_one_kind = other->released.empty() == contenders[than].released.empty();
       const double clearly = std::max(more * options_.class_gain,
                                       of_one_kind ? kHalf * rules_.excess(trial.held_out) : 0);
-      if (counted(instead, contest) < counted(trial, contest) + clearly || cancels(instead))
+      if (counted(instead, contest) < counted(trial, contest) + clearly || !holds_up(instead))
         continue;
       trial = std::move(instead);
       numbers = other->numbers.size();
@@ -487,7 +507,7 @@ class Search {
                                                      : -options_.least_gain;
         FittedMachine instead = less;
         add(instead, *better, {});
-        if (counted(instead, contest) >= counted(m, contest) - allowed_loss) {
+        if (counted(instead, contest) >= counted(m, contest) - allowed_loss && holds_up(instead)) {
           m = std::move(instead);  // the last of its kind, so that the next one is here
           continue;
         }
@@ -519,7 +539,7 @@ class Search {
       else
         add(instead, r, {}, far_more_than(m));
       const double less_counts = present - counted(instead, contest);
-      if (less_counts > band || instead.added.empty()) continue;
+      if (less_counts > band || instead.added.empty() || !holds_up(instead)) continue;
       alike.push_back(r.candidate);
       const double intricacy = contest.intricacy(instead.added.back()) + less_counts / band;
       if (intricacy > least - kClearlySimpler) continue;
@@ -579,6 +599,7 @@ class Search {
   const std::vector<Candidate>& candidates_;
   const DiagnosisOptions& options_;
   const KeepGoing& keep_going_;
+  ControllerCheck controller_;
   SelectionResult result_;
   std::vector<TrialColumns> at_base_;  ///< the trials of the base machine
   std::vector<TrialColumns> known_;    ///< and those with shapes that showed later in this climb

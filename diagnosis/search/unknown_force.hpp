@@ -6,12 +6,15 @@
 // is. Taken off the signals alone (differential.hpp), what it does to a change is put down to other
 // effects.
 //
-//   F(t) := F(t) - mean over laps of (force of the drive - that of the model under F), over 10 ms
+//   F(t) := F(t) - (e_F - J e_x''),   means over laps and over 10 ms, twice
 //
-// in turns from nought, while the axis moves; where it stands, as before. A force is believed only
-// where it explains another signal, which it was not taken from: a fifth of the mean square of what
-// the position is off the model. So none is found where no force is recorded, where the record has
-// a known force, or where the model is off for other reasons (a controller at another rate).
+// in turns from nought, e_F and e_x what force and position are off the model under F, J the
+// inertia of the axis: the force that is missing for it to move as it did, whatever its controller
+// does. Where the axis stands, as before. It is believed where it stands out of the noise and the
+// turns come to an end: half of it at most is left. None is found where no force is recorded or
+// where the record has a known force. Where a hypothesis has more dry friction, it grows as that
+// does: it is what that law has wrong. Known to 5 %, what is slow of it and what is quick each for
+// itself.
 #pragma once
 
 #include <vector>
@@ -26,8 +29,5 @@ namespace vcnc {
 using ForceOfAxes = PerAxis<std::vector<double>>;
 
 ForceOfAxes unknown_force(const Record& healthy, const Machine& declared);
-
-/// What is missing becomes what was before it, at the beginning what comes first.
-void hold_over_gaps(std::vector<double>& series);
 
 }  // namespace vcnc

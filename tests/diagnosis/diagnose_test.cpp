@@ -775,7 +775,8 @@ TEST(LessHealthy, HoldsAgainstThePieceAsItWasClamped) {
   const DifferentialRecord difference =
       less_healthy(now, healthy_run(healthy, of_healthy, Machine()));
   EXPECT_NEAR(number_of(difference.healthy, "effects.setup.piece_offset.shift_um.x"), 15, 0.05);
-  EXPECT_NEAR(difference.off[0], 0.5 * toy::kProbeNoise, 0.1 * toy::kProbeNoise);  // of 4 laps
+  EXPECT_NEAR(difference.off_in({SignalKind::deflection, 0}), 0.5 * toy::kProbeNoise,
+              0.1 * toy::kProbeNoise);  // of 4 laps
   // No reading is left out because the piece is not where it is declared to be.
   const std::vector<double>& reading = difference.record.find(SignalKind::deflection, 0)->value;
   EXPECT_TRUE(std::all_of(reading.begin(), reading.end(), [](double v) { return v == v; }));
