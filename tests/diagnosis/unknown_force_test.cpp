@@ -145,5 +145,24 @@ TEST(UnknownForce, OfAnotherDayIsNoDeviation) {
   EXPECT_TRUE(d.effects.empty());
 }
 
+/// Dry friction that takes a way to turn over, which nobody declared.
+Machine with_bristles(double level) {
+  Machine machine = with_oil();
+  machine.effects.axis[kX].get<Coulomb>().level = level;
+  machine.effects.axis[kX].get<Presliding>().stiffness = 15e6;
+  return machine;
+}
+
+TEST(UnknownForce, MoreFrictionOfAnotherLawIsNoGain) {
+  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
+  const Diagnosis d = change(with_bristles(100), with_bristles(150), false);
+  EXPECT_NE(d.verdict, DiagnosisVerdict::no_deviation);
+  for (const FoundEffect& e : d.effects) {
+    EXPECT_NE(e.name, "kv_error");
+    EXPECT_NE(e.name, "velocity_gain_error");
+    EXPECT_NE(e.name, "integral_time_error");
+  }
+}
+
 }  // namespace
 }  // namespace vcnc::unknown_force_test
