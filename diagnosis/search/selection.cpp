@@ -162,17 +162,27 @@ class Search {
   /// Whether its effects are told by what else is known of them than what they explain together.
   bool holds_up(const FittedMachine& m) const { return !cancels(m) && !contradicts_controller(m); }
 
-  /// Whether the controller's own signals say that a gain is not what it is told to be: it stands
-  /// for a force (controller_check.hpp).
+  /// Whether the controller's own signals say that a gain is not what it is told to be, or all of
+  /// an axis together are not: it stands for a force (controller_check.hpp).
   bool contradicts_controller(const FittedMachine& m) const {
-    for (std::size_t i = 0; i < m.added.size(); ++i) {
-      const Candidate& c = candidates_[m.added[i].candidate];
-      const auto name = std::find(kAxisNames.begin(), kAxisNames.end(), c.place);
-      if (!c.of_loops || name == kAxisNames.end()) continue;
-      const auto b =
-          controller_.of(static_cast<std::size_t>(name - kAxisNames.begin()),
-                         taken_out(m, i, Common::held).prediction, evidence_.predict(m.machine));
-      if (b && b->contradicts()) return true;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      std::vector<std::size_t> of_loops;
+      for (const AddedEffect& a : m.added)
+        if (candidates_[a.candidate].of_loops && candidates_[a.candidate].place == kAxisNames[axis])
+          of_loops.push_back(a.candidate);
+      if (of_loops.empty()) continue;
+      const Prediction with = evidence_.predict(m.machine);
+      std::vector<std::vector<std::size_t>> doubted;
+      for (const std::size_t one : of_loops) doubted.push_back({one});
+      if (of_loops.size() > 1) doubted.push_back(of_loops);
+      for (const std::vector<std::size_t>& some : doubted) {
+        Machine without = m.machine;
+        for (const std::size_t c : some)
+          for (const FreeNumber& n : candidates_[c].numbers)
+            move_number(without, n.key, number_of(declared_, n.key));
+        const auto b = controller_.of(axis, evidence_.predict(without), with);
+        if (b && b->contradicts()) return true;
+      }
     }
     return false;
   }
