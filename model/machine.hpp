@@ -111,7 +111,8 @@ struct ServoParams {
           "acceleration feed-forward, 1 = full");
     visit("current_lag_us", p.current_lag, unit::us, Range{0, 5000}, "lag of the current loop");
     visit("position_lag_us", p.position_lag, unit::us, Range{0, 5000},
-          "lag of the position loop of a cascade: half its cycle, and its computing time");
+          "lag of the position loop of a cascade: half its cycle, and its computing time; "
+          "feed-forward passes by it");
     visit("velocity_lag_us", p.velocity_lag, unit::us, Range{0, 5000},
           "lag of the filter of a cascade's measured velocity");
     visit.choice("feedback", p.feedback, {{"motor", Feedback::motor}, {"load", Feedback::load}},

@@ -49,7 +49,8 @@ std::string verdict_sentence(const Diagnosis& d) {
                  : "what was added leaves nothing but noise";
     case DiagnosisVerdict::partly:
       return fmt::format(
-          "what was added explains {:.0f} % of what was to be explained{}", d.explained_share * 100,
+          "what was added explains {} % of what was to be explained{}",
+          d.explained_share < 0.995 ? fmt::format("{:.0f}", d.explained_share * 100) : "over 99",
           d.model_form_share > 0
               ? fmt::format(
                     "; {:.0f} % is an error of the model's form, so what is named goes along "
