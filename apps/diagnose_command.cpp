@@ -98,7 +98,8 @@ void tell_unknown_forces(const ForceOfAxes& unknown, std::vector<std::string>& n
     if (sum > 0)
       notes.push_back(fmt::format(
           "The reference run has a force on {} that the declared machine has not, {:.3g} {} rms; "
-          "it counts as there in this run, too.",
+          "it counts as there in this run, too. vcnc commission fits a friction law to such a run; "
+          "against that model changes of friction are told better.",
           kAxisNames[axis], std::sqrt(sum / static_cast<double>(unknown[axis].size())),
           is_rotary(axis) ? "N m" : "N"));
   }

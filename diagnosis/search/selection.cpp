@@ -24,6 +24,7 @@ constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to loo
 constexpr double kHalf = 0.5;  ///< of what is left: for a further effect than few, or another one
 /// Times what was to be explained that two effects of one drive make each and take back together.
 constexpr double kCancels = 9;
+constexpr double kAtTheEnd = 2;          ///< times the least that a shape may be
 constexpr double kClearlySimpler = 0.5;  ///< numbers
 constexpr double kPartInALine = 0.25;  ///< of the least gain: less, and a wave is not worth a trial
 constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth that a rival must promise
@@ -160,7 +161,20 @@ class Search {
   }
 
   /// Whether its effects are told by what else is known of them than what they explain together.
-  bool holds_up(const FittedMachine& m) const { return !cancels(m) && !contradicts_controller(m); }
+  bool holds_up(const FittedMachine& m) const {
+    return !cancels(m) && !is_another_law(m) && !contradicts_controller(m);
+  }
+
+  /// Whether a friction went to the end at which its law is another one: a drag that builds up over
+  /// no speed is dry friction.
+  bool is_another_law(const FittedMachine& m) const {
+    return std::any_of(m.added.begin(), m.added.end(), [&](const AddedEffect& a) {
+      return candidates_[a.candidate].family == Family::friction &&
+             std::any_of(a.numbers.begin(), a.numbers.end(), [](const FreedNumber& n) {
+               return n.shape && n.number.min > 0 && n.value < kAtTheEnd * n.number.min;
+             });
+    });
+  }
 
   /// Whether the controller's own signals say that a gain is not what it is told to be, or all of
   /// an axis together are not: it stands for a force (controller_check.hpp).
