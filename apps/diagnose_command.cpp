@@ -19,6 +19,7 @@
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/quadrature.hpp"
 #include "diagnosis/records/any_record.hpp"
+#include "diagnosis/records/series.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
 #include "diagnosis/replica/readings_check.hpp"
 #include "diagnosis/report/diagnosis_json.hpp"
@@ -92,29 +93,31 @@ std::string other_machine(const Record& run, const Record& other) {
 }
 
 void tell_unknown_forces(const ForceOfAxes& unknown, std::vector<std::string>& notes) {
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    double sum = 0;
-    for (const double f : unknown[axis]) sum += f * f;
-    if (sum > 0)
-      notes.push_back(fmt::format(
-          "The reference run has a force on {} that the declared machine has not, {:.3g} {} rms; "
-          "it counts as there in this run, too. vcnc commission fits a friction law to such a run; "
-          "against that model changes of friction are told better.",
-          kAxisNames[axis], std::sqrt(sum / static_cast<double>(unknown[axis].size())),
-          is_rotary(axis) ? "N m" : "N"));
-  }
+  std::string forces;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (const double square = mean_square(unknown[axis]); square > 0)
+      forces += fmt::format("{}{:.3g} {} rms on {}", forces.empty() ? "" : ", ", std::sqrt(square),
+                            is_rotary(axis) ? "N m" : "N", kAxisNames[axis]);
+  if (!forces.empty())
+    notes.push_back("The reference run has forces that the declared machine has not, " + forces +
+                    "; they count as there in this run, too. vcnc commission fits friction laws to "
+                    "such a run; against that model changes of friction are told better.");
 }
 
 void tell_lags(const Machine& declared, const Machine& healthy, std::vector<std::string>& notes) {
+  std::string lags;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const ServoParams &was = declared.axes[axis].servo, &is = healthy.axes[axis].servo;
     if (is.position_lag == was.position_lag && is.velocity_lag == was.velocity_lag) continue;
-    notes.push_back(fmt::format(
-        "The controller of {} in the reference run is as with position_lag_us = {:.0f} and "
-        "velocity_lag_us = {:.0f}, declared are {:.0f} and {:.0f}; it counts so in this run, too.",
-        kAxisNames[axis], 1e6 * is.position_lag, 1e6 * is.velocity_lag, 1e6 * was.position_lag,
-        1e6 * was.velocity_lag));
+    lags += fmt::format("; {} {:.0f} and {:.0f}, declared {:.0f} and {:.0f}", kAxisNames[axis],
+                        1e6 * is.position_lag, 1e6 * is.velocity_lag, 1e6 * was.position_lag,
+                        1e6 * was.velocity_lag);
   }
+  if (!lags.empty())
+    notes.push_back(
+        "The controllers of the reference run are as with these position_lag_us and "
+        "velocity_lag_us, which count in this run, too" +
+        lags + ".");
 }
 
 void append_told(std::string sentence, std::vector<std::string>& warnings) {
