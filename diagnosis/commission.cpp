@@ -309,7 +309,8 @@ class Commissioner {
       FittedMachine better = with_candidates(candidates_, machine_, {*best});
       converge(evidence_, better);
       if (!gains_enough(machine_, better, least_share)) return;
-      if (!stands_for_force(better)) accept(std::move(better), place, told(candidates_[*best]));
+      if (!is_as_declared(better) && !stands_for_force(better))
+        accept(std::move(better), place, told(candidates_[*best]));
       left.erase(best);
     }
   }
