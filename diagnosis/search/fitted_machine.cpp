@@ -71,6 +71,7 @@ std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vect
   return to;
 }
 
+constexpr double kDamping = 1e-3;     ///< of steps along columns (refit.hpp)
 constexpr double kNoStep = 1;         ///< chi-square that no step is worth
 constexpr double kMuch = 10;          ///< and that a part of the step is worth to be sought for
 constexpr double kBetter = 0.1;       ///< of what a step promises, that it may do better by
@@ -189,10 +190,10 @@ void fit_in_rounds(Evidence& evidence, FittedMachine& m, const std::vector<std::
                    const NoUse& no_use = {}) {
   constexpr int kLinearisations = 8;
   for (int round = 0; round < kLinearisations; ++round) {
-    const double before = m.held_out, last = gain;
+    const double before = m.held_out, off = misfit(evidence, m), last = gain;
     linearise(evidence, m, which);
     converge_exactly(evidence, m, no_use);
-    gain = before - m.held_out;
+    gain = std::max(before - m.held_out, off - misfit(evidence, m));
     const double next =
         last > 0 && std::isfinite(last) ? gain * std::sqrt(std::abs(gain) / last) : gain;
     if (std::min(gain, next) < settled(evidence, m)) break;
@@ -204,6 +205,30 @@ void fit_in_rounds(Evidence& evidence, FittedMachine& m, const std::vector<std::
 constexpr double kPulledFar = 1.5;
 /// The same, even where nothing else is left.
 constexpr double kPulledOut = 3;
+
+/// With declared numbers that were pulled back where they are declared, and what was added fitted
+/// to that first: from where it stands beside pulled numbers, the way may be too far.
+FittedMachine as_if_never_pulled(Evidence& evidence, FittedMachine m) {
+  constexpr int kGlance = 4;
+  LinearPart others;
+  for (std::size_t i = 0; i < m.nuisances.numbers.size(); ++i) {
+    FreedNumber& n = m.nuisances.numbers[i];
+    if (std::abs(n.pull()) > kPulledFar) {
+      n.value = n.centre;
+    } else {
+      others.numbers.push_back(n);
+      others.columns.push_back(m.nuisances.columns[i]);
+    }
+  }
+  m.machine = with(m.machine, m.nuisances.numbers);
+  evidence.anchor(m.machine);
+  Refit alone = refit(evidence, m.machine, m.numbers(), others, {.max_iterations = kGlance});
+  alone.linear = between(others.numbers, alone.linear, 1.0);
+  alone.machine = with(alone.machine, alone.linear);
+  settle_from(evidence, m, alone);
+  anchor_at(evidence, m);
+  return m;
+}
 
 }  // namespace
 
@@ -270,7 +295,7 @@ void converge(const Evidence& evidence, FittedMachine& m) {
     const std::vector<double> weight = weights(evidence, residual);
     const double least = misfit(evidence, residual, weight, m.nuisances.numbers);
     const Refit f = refit(evidence, m.machine, live, without(m.nuisances, live),
-                          {.max_iterations = 8, .weight = weight});
+                          {.max_iterations = 8, .weight = weight, .damping = kDamping});
     if (!step_towards(evidence, m, f, weight, least)) {
       if (round == 0) stay(evidence, m);
       break;
@@ -357,12 +382,7 @@ void settle_in(Evidence& evidence, FittedMachine& m, const NoUse& no_use) {
   const bool stands_in = pulled > kPulledOut,
              may_gain = pulled > kPulledFar && m.held_out > no_use.little;
   if ((stands_in || may_gain) && m.held_out < no_use.much) {
-    FittedMachine anew = m;
-    for (FreedNumber& n : anew.nuisances.numbers)
-      if (n.tolerance > 0) n.value = n.centre;
-    anew.machine = with(anew.machine, anew.nuisances.numbers);
-    evidence.anchor(anew.machine);
-    stay(evidence, anew);
+    FittedMachine anew = as_if_never_pulled(evidence, m);
     fit_in_rounds(evidence, anew, every(anew), kNoGainYet, no_use);
     if (misfit(evidence, anew) < misfit(evidence, m))
       m = std::move(anew);

@@ -86,7 +86,8 @@ struct Eliminated {
   Eigen::MatrixXd gram;
 };
 
-Eliminated eliminate(const Eigen::MatrixXd& g, Eigen::Index live, const LinearPart& linear) {
+Eliminated eliminate(const Eigen::MatrixXd& g, Eigen::Index live, const LinearPart& linear,
+                     double damping) {
   const Eigen::Index n = static_cast<Eigen::Index>(linear.numbers.size());
   const Eigen::VectorXd precision = linear.precision(), offset = linear.offset();
   Eliminated e;
@@ -97,6 +98,7 @@ Eliminated eliminate(const Eigen::MatrixXd& g, Eigen::Index live, const LinearPa
   e.gram = jj;
   if (n == 0) return e;
   Eigen::MatrixXd a = g.block(1 + live, 1 + live, n, n);
+  a.diagonal() *= 1 + damping;
   a.diagonal() += precision;
   a.diagonal().array() += 1e-12 * (1 + a.diagonal().maxCoeff());
   const Eigen::VectorXd b =
@@ -147,10 +149,12 @@ LinearPart without(const LinearPart& part, const std::vector<FreedNumber>& live)
 }
 
 LinearStep linear_step(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& held_out,
-                       const Eigen::VectorXd& precision, const Eigen::VectorXd& offset) {
+                       const Eigen::VectorXd& precision, const Eigen::VectorXd& offset,
+                       double damping) {
   const Eigen::Index n = precision.size();
   LinearStep s;
   Eigen::MatrixXd a = fitted.block(1, 1, n, n);
+  a.diagonal() *= 1 + damping;
   a.diagonal() += precision;
   a.diagonal().array() += 1e-10 * (1e-6 + a.diagonal().array());
   const Eigen::VectorXd b =
@@ -236,7 +240,7 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
     const Eigen::Index used = derivatives ? k : 0;
     const Eigen::MatrixXd g =
         products.with(p.residual, derivatives ? p.columns : none).fitted_with(options.weight);
-    const Eliminated e = eliminate(g, used, linear);
+    const Eliminated e = eliminate(g, used, linear, options.damping);
     Linearisation at{e.cost, {}, {}};
     if (derivatives) {
       at.gradient = e.gradient;
@@ -260,7 +264,7 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
   Point& best = visit(solution.x, true);
   const RoleGrams grams = products.with(best.residual, {});
   const LinearStep step = linear_step(grams.fitted_with(options.weight), grams.held_out,
-                                      linear.precision(), linear.offset());
+                                      linear.precision(), linear.offset(), options.damping);
   result.live = moved(live, solution.x);
   result.linear = linear.numbers;
   for (std::size_t i = 0; i < result.linear.size(); ++i) {

@@ -43,9 +43,11 @@ struct LinearStep {
   double held_out = 0;
 };
 
-/// Products of [z, columns] summed over the fitted and the held-out blocks.
+/// Products of [z, columns] summed over the fitted and the held-out blocks. `damping`: see
+/// RefitOptions.
 LinearStep linear_step(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& held_out,
-                       const Eigen::VectorXd& precision, const Eigen::VectorXd& offset);
+                       const Eigen::VectorXd& precision, const Eigen::VectorXd& offset,
+                       double damping = 0);
 
 struct Refit {
   std::vector<FreedNumber> live, linear;  ///< at the solution
@@ -66,6 +68,10 @@ struct RefitOptions {
   int max_iterations = 12;
   Begin begin = Begin::near;
   std::vector<double> weight = {};  ///< of each channel's chi-square in what is made least; none: 1
+  /// Times what a linear number's own curvature counts more, so that numbers whose columns nearly
+  /// cancel each other do not take long steps that only sensitivities believe in (Levenberg 1944,
+  /// Marquardt 1963).
+  double damping = 0;
   /// A chi-square from which no search begins.
   double hopeless = std::numeric_limits<double>::infinity();
 };
