@@ -55,6 +55,11 @@ void sort_by_worth(std::vector<Contender>& all) {
 
 }  // namespace
 
+bool may_be_released(const DiagnosisOptions& options, const FreedNumber& n) {
+  return !n.common() && n.tolerance > 0 && !n.number.key.starts_with("effects.setup.") &&
+         is_suspected(options.suspects, n.number.key);
+}
+
 std::vector<Screened> by_what_counts(std::vector<Screened> all) {
   std::stable_sort(all.begin(), all.end(),
                    [](const Screened& x, const Screened& y) { return x.counted > y.counted; });
@@ -365,9 +370,8 @@ std::vector<Contender> Contest::releases(Released which, double as_much) const {
   for (std::size_t i = 0; i < now_.nuisances.numbers.size(); ++i) {
     const FreedNumber& n = now_.nuisances.numbers[i];
     const double far = rules_.options.out_of_tolerance;
-    if (n.common() || n.tolerance <= 0 || n.number.key.starts_with("effects.setup.") ||
-        !is_suspected(rules_.options.suspects, n.number.key) ||
-        (which == Released::where_pulled && std::abs(n.pull()) < far))
+    if (!may_be_released(rules_.options, n) ||
+        (which == Released::where_pulled && !n.held && std::abs(n.pull()) < far))
       continue;
     Eigen::VectorXd precision = ground_.precision;
     precision[static_cast<Eigen::Index>(i)] = 0;
@@ -384,6 +388,7 @@ std::vector<Contender> Contest::releases(Released which, double as_much) const {
     c.fit.held_out_of = left_after(ground_.grams.held_out_of, s.step);
     all.push_back(std::move(c));
     all.back().numbers.front().value = value;
+    all.back().numbers.front().held = false;
   }
   refit_released(all, kWorthAFit * as_much);
   return all;

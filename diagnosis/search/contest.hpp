@@ -33,6 +33,9 @@ struct Contender {
   double worth() const { return counts - 4 * static_cast<double>(numbers.size()); }
 };
 
+/// Whether a declared number may be told to be out of its tolerance.
+bool may_be_released(const DiagnosisOptions& options, const FreedNumber& number);
+
 /// Those that count most first: what the form of the model may make does not count, however much it
 /// is (counted_gain.hpp).
 std::vector<Screened> by_what_counts(std::vector<Screened> screened);

@@ -272,7 +272,7 @@ FittedMachine FittedMachine::holding(const std::string& key, const FittedMachine
   std::erase_if(held.released, [&](const ReleasedNumber& r) { return r.key == key; });
   for (FreedNumber& n : held.nuisances.numbers)
     for (const FreedNumber& as : base.nuisances.numbers)
-      if (n.number.key == key && as.number.key == key) n.tolerance = as.tolerance;
+      if (n.number.key == key && as.number.key == key) n.tolerance = as.tolerance, n.held = true;
   return held;
 }
 
@@ -371,6 +371,25 @@ void converge_anew(const Evidence& evidence, FittedMachine& m) {
   stay(evidence, m);
   linearise(evidence, m, every(m));
   converge(evidence, m);
+}
+
+FittedMachine within_tolerance(Evidence& evidence, FittedMachine m, double tolerances,
+                               const std::function<bool(const FreedNumber&)>& may_be_found) {
+  constexpr int kOneAfterTheOther = 3;
+  for (int round = 0; round < kOneAfterTheOther; ++round) {
+    bool any = false;
+    for (FreedNumber& n : m.nuisances.numbers) {
+      if (n.held || std::abs(n.pull()) <= tolerances || !may_be_found(n)) continue;
+      n.held = any = true;
+      n.value = n.centre;
+    }
+    if (!any) break;
+    m.machine = with(m.machine, m.nuisances.numbers);
+    evidence.anchor(m.machine);
+    stay(evidence, m);
+    converge_exactly(evidence, m);
+  }
+  return m;
 }
 
 void settle_in(Evidence& evidence, FittedMachine& m, const NoUse& no_use) {

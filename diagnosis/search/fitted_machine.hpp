@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <set>
 #include <string>
@@ -60,6 +61,11 @@ std::set<std::string> drives_found(const FittedMachine& machine,
 
 /// Fits all numbers of a machine together, nuisances included, until nothing moves.
 void converge(const Evidence& evidence, FittedMachine& machine);
+
+/// With declared numbers that were pulled further than some tolerances held at their declaration,
+/// of those that may be found: what is so far off is no matter of tolerance.
+FittedMachine within_tolerance(Evidence& evidence, FittedMachine machine, double tolerances,
+                               const std::function<bool(const FreedNumber&)>& may_be_found);
 
 /// Takes the sensitivities of all declared numbers where the machine stands, then fits as above.
 void converge_anew(const Evidence& evidence, FittedMachine& machine);

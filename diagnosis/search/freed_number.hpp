@@ -22,13 +22,16 @@ struct FreedNumber {
   double centre = 0;     ///< declared
   double tolerance = 0;  ///< standard deviation of the declaration; 0: nothing is known
   bool shape = false;    ///< frequency, time constant, ...: moved in small steps
+  bool held = false;     ///< at its declaration, as if it were exact
 
   /// The same in the healthy run (common_numbers.hpp): counted from what is declared.
   bool common() const { return number.key.starts_with(kCommon); }
   double pull() const { return tolerance > 0 ? (value - centre) / tolerance : 0; }
   /// Inverse variance of the declaration in units of the typical size.
   double precision() const {
-    return tolerance > 0 ? number.typical * number.typical / (tolerance * tolerance) : 0;
+    constexpr double kExact = 1e-3;  // of its tolerance
+    const double off = held ? kExact * tolerance : tolerance;
+    return off > 0 ? number.typical * number.typical / (off * off) : 0;
   }
 };
 

@@ -47,13 +47,14 @@ class Search {
 
   SelectionResult run() {
     go("fitting the declared machine", 0);
-    result_.base = fit_declared(evidence_, declared_, options_.against);
+    const FittedMachine fitted = fit_declared(evidence_, declared_, options_.against);
+    result_.base = within_tolerance(fitted);
     rules_.floor_of = noise_floor(evidence_, result_.base.residual, options_.form_of_channel);
     rules_.floor = result_.floor =
         std::accumulate(rules_.floor_of.begin(), rules_.floor_of.end(), 0.0);
     rules_.base_of = evidence_.chi2_of(result_.base.residual, Role::held_out);
     result_.base.rounding = evidence_.made_by_steps(result_.base.prediction);
-    simulate();
+    simulate(fitted);
     result_.found = result_.base;
     if (going_) {
       Contest contest(rules_, result_.base);
@@ -68,6 +69,8 @@ class Search {
         result_.found = std::move(found);
         result_.ladder = std::move(ladder);
       }
+      // Where nothing is found, it was a matter of tolerance after all.
+      if (result_.found.found() == 0) result_.found = result_.base = fitted;
       evidence_.anchor(result_.found.machine);
     }
     result_.interrupted = !going_;
@@ -81,6 +84,12 @@ class Search {
     return going_;
   }
 
+  FittedMachine within_tolerance(const FittedMachine& m) {
+    return vcnc::within_tolerance(
+        evidence_, m, options_.out_of_tolerance,
+        [&](const FreedNumber& n) { return may_be_released(options_, n); });
+  }
+
   /// The base machine with one of the contenders, and then one effect after the other until none
   /// gains enough.
   FittedMachine climbed(const std::vector<Contender>& contenders, const Contest& first,
@@ -89,7 +98,7 @@ class Search {
     result_.trials = known_ = at_base_;
     values_.erase(values_.begin() + 1, values_.end());
     evidence_.anchor(now.machine);
-    if (!accept_one(now, contenders, first)) return now;
+    if (!accept_one(now, now, contenders, first)) return now;
     while (going_) {
       now.rounding = rounding_of(now);
       look_again(now);
@@ -98,12 +107,13 @@ class Search {
       ladder.push_back(step_of(now, ladder.size()));
       if (now.found() >= options_.max_effects) break;
       if (imitates(now)) break;
-      Contest contest(rules_, now);
+      const FittedMachine from = within_tolerance(now);
+      Contest contest(rules_, from);
       const std::vector<Contender> next = contest.contenders();
       if (now.found() >= options_.few_effects && !next.empty() &&
-          next.front().gain < kHalf * rules_.excess(now.held_out))
+          next.front().gain < kHalf * rules_.excess(from.held_out))
         break;
-      if (!accept_one(now, next, contest)) break;
+      if (!accept_one(now, from, next, contest)) break;
     }
     return now;
   }
@@ -144,19 +154,21 @@ class Search {
     return all;
   }
 
-  /// Adds the best contender that is still worth it when everything has been fitted together.
-  bool accept_one(FittedMachine& now, const std::vector<Contender>& contenders,
-                  const Contest& contest) {
+  /// Adds the best contender of a contest about what `from` leaves that is still worth it when
+  /// everything has been fitted together.
+  bool accept_one(FittedMachine& now, const FittedMachine& from,
+                  const std::vector<Contender>& contenders, const Contest& contest) {
     for (std::size_t i = 0; i < std::min(kAttempts, contenders.size()) && going_; ++i) {
       FittedMachine trial =
-          fitted_with(now, contenders[i],
+          fitted_with(from, contenders[i],
                       i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
-      if (now.held_out - trial.held_out > contenders[i].needed && holds_up(trial)) {
-        now = best_of_as_good(now, std::move(trial), contenders, i, contest);
+      if (from.held_out - trial.held_out > contenders[i].needed && holds_up(trial)) {
+        now = best_of_as_good(from, std::move(trial), contenders, i, contest);
         return true;
       }
-      evidence_.anchor(now.machine);
+      evidence_.anchor(from.machine);
     }
+    evidence_.anchor(now.machine);
     return false;
   }
 
@@ -300,7 +312,8 @@ class Search {
 
   double worth_of_line() const { return kPartInALine * options_.least_gain; }
 
-  void simulate() {
+  /// `fitted`: the declared machine with all numbers in and out of tolerance.
+  void simulate(const FittedMachine& fitted) {
     if (!going_) return;
     values_.emplace_back(evidence_, declared_, result_.base.residual, worth_of_line());
     const std::vector<Trial> all = worth_trying(values_.front());
@@ -313,8 +326,9 @@ class Search {
         evidence_, result_.base.machine, result_.base.prediction, candidates_, ground, needed(),
         [&](double s) { return go("trying detection limits", s); }, result_.trials);
     at_base_ = result_.trials;
-    result_.release_limits = release_limits(ground, result_.base.nuisances.numbers,
-                                            options_.out_of_tolerance, options_.release_gain);
+    result_.release_limits =
+        release_limits(Ground(evidence_, fitted.residual, fitted.nuisances),
+                       fitted.nuisances.numbers, options_.out_of_tolerance, options_.release_gain);
   }
 
   /// What an effect of a drive does depends on the others that it has (play rattles where nothing
@@ -394,6 +408,7 @@ class Search {
            double much = std::numeric_limits<double>::infinity()) {
     const Explained explained =
         minus(evidence_.chi2_of(m.residual, Role::held_out), best.fit.held_out_of);
+    for (FreedNumber& n : m.nuisances.numbers) n.held = false;
     if (!best.released.empty()) {
       for (FreedNumber& n : m.nuisances.numbers)
         if (n.number.key == best.released) n.tolerance = 0;
@@ -461,6 +476,7 @@ class Search {
       m.released[i].explained =
           minus(ground.held_out_of, evidence_.chi2_of(m.residual, Role::held_out));
       if (ground.held_out - m.held_out > options_.release_gain) continue;
+      for (FreedNumber& n : held.nuisances.numbers) n.held = false;
       held.held_out = ground.held_out;
       converge(evidence_, held);
       m = std::move(held);
