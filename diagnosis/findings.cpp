@@ -694,6 +694,7 @@ class Report {
     if (d_.effects.empty()) return;
     const std::vector<std::string> worse = signals_made_worse(d_.figures);
     d_.warnings.insert(d_.warnings.end(), worse.begin(), worse.end());
+    made_worse_ = !worse.empty();
   }
 
   void tell_ladder() {
@@ -737,12 +738,12 @@ class Report {
     else if (d_.law || !d_.vibrations.empty())
       d_.verdict = named ? partly : unexplained;
     else if (named)
-      d_.verdict =
-          !still_off_ && (ratio < kSilent || d_.explained_share > kAllExplained ||
-                          (ratio < kQuiet && few &&
-                           (d_.explained_share > kMostExplained || !before_.chatter.empty())))
-              ? explained
-              : partly;
+      d_.verdict = !still_off_ && !made_worse_ &&
+                           (ratio < kSilent || d_.explained_share > kAllExplained ||
+                            (ratio < kQuiet && few &&
+                             (d_.explained_share > kMostExplained || !before_.chatter.empty())))
+                       ? explained
+                       : partly;
     else
       d_.verdict = !still_off_ && ratio < kQuiet ? no_deviation : unexplained;
     if (!d_.differential && !selection_.interrupted && evidence_.noise().from_repetitions &&
@@ -762,8 +763,9 @@ class Report {
   SelectionResult selection_;
   FoundBeforehand before_;
   double floor_;
-  bool inexact_;            ///< the model is known not to be the machine
-  bool still_off_ = false;  ///< some signal is, by more than a model of the cause may be wrong by
+  bool inexact_;             ///< the model is known not to be the machine
+  bool made_worse_ = false;  ///< some signal is, by what was added
+  bool still_off_ = false;   ///< some signal is, by more than a model of the cause may be wrong by
   std::vector<std::string> pulled_;  ///< declared numbers that were, and are not found
   bool withdrawn_ = false, withheld_ = false;
   double told_held_out_ = selection_.found.held_out;  ///< chi-square that what is told leaves
@@ -782,7 +784,7 @@ std::vector<std::string> signals_made_worse(const std::vector<SignalFigure>& fig
     const ShownUnit unit = shown_unit(f.channel);
     sentences.push_back(fmt::format(
         "With what was added {} is further off than without, {:.3g} {} instead of "
-        "{:.3g}: it cannot be all of what is there, and may be none of it.",
+        "{:.3g}: it cannot be all of what is there, or stands for something else.",
         channel_name(f.channel), f.after * unit.factor, unit.name, f.before * unit.factor));
   }
   return sentences;

@@ -4,8 +4,8 @@
 //
 //   NOT IDENTIFIABLE  nothing in the library would show, or there is too little to compare
 //   NO DEVIATION      nothing was found, c < 1.05 and no signal is still off
-//   EXPLAINED         something was found and c < 1.05, or at least 98 % of the excess is gone, and
-//                     no signal is still off
+//   EXPLAINED         something was found and c < 1.05, or at least 98 % of the excess is gone, no
+//                     signal is still off, and none is further off than without it
 //   PARTLY            something was found, but more is left
 //   UNEXPLAINED       something is left that no effect of the library makes: it repeats, or an axis
 //                     vibrates, or readings shift from lap to lap by three times their noise
