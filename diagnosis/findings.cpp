@@ -660,14 +660,15 @@ class Report {
       if (evidence_.replica().channels()[c].kind == SignalKind::deflection)
         finest = std::min(finest, 5 * std::sqrt(2.0) * evidence_.noise().channels[c].rms /
                                       of_.declared.probe.signal_period);
-    if (finest < 1) d_.excitation.push_back({"probe.period_slip", finest, true, ""});
+    if (finest < 1) d_.excitation.push_back({"probe.period_slip", finest, true, "", ""});
     for (const auto& [c, limit] : limits) {
       const Candidate& candidate = of_.candidates[c];
       double typical = 0;
       for (std::size_t i = 0; i < candidate.numbers.size() && typical == 0; ++i)
         typical = std::abs(candidate.numbers[i].typical);
       const bool limited = is_limit(candidate.numbers.front());
-      Excitation e{candidate.name(), limit, limited ? std::isfinite(limit) : limit < typical, ""};
+      Excitation e{candidate.name(), limit, limited ? std::isfinite(limit) : limit < typical, "",
+                   candidate.numbers.front().key};
       if (!e.excited) e.program = program_for(candidate.effect);
       if (e.excited || !selection_.interrupted) d_.excitation.push_back(std::move(e));
     }
@@ -677,7 +678,7 @@ class Report {
       const auto [place, effect] = place_and_effect(n.key);
       const double limit = selection_.release_limits[i];
       Excitation e{never_quite_absent(n.key) ? place + "." + effect : n.key, limit,
-                   std::isfinite(limit), ""};
+                   std::isfinite(limit), "", n.key};
       if (!e.excited) e.program = program_for(effect);
       d_.excitation.push_back(std::move(e));
     }
@@ -694,7 +695,9 @@ class Report {
     if (d_.effects.empty()) return;
     const std::vector<std::string> worse = signals_made_worse(d_.figures);
     d_.warnings.insert(d_.warnings.end(), worse.begin(), worse.end());
-    made_worse_ = !worse.empty();
+    std::vector<SignalFigure> at_rest = d_.figures;
+    std::erase_if(at_rest, [&](const SignalFigure& f) { return is_stirred(f.channel); });
+    made_worse_ = !signals_made_worse(at_rest).empty();
   }
 
   void tell_ladder() {

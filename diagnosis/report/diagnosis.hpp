@@ -63,6 +63,7 @@ struct Excitation {
   double detection_limit = 0;  ///< of its first number, in the unit of its key; inf: not excited
   bool excited = false;
   std::string program;  ///< the canned program that would show it; empty if excited
+  std::string key;      ///< of that number
 };
 
 /// One rung of the ladder: the state after adding an effect.

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "analysis/figure_style.hpp"
+#include "diagnosis/report/shown_law.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {
@@ -86,54 +87,6 @@ std::string quoted_label(std::string text) {
   std::replace(text.begin(), text.end(), '\'', ' ');
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
-}
-
-struct Shown {
-  std::string name, unit;
-  double factor = 1;  ///< from SI
-};
-
-/// A covariate in the units of pages.
-Shown shown_covariate(Covariate of, bool rotary) {
-  const std::string length = rotary ? "deg" : "mm";
-  const double factor = rotary ? 1 / kDegree : 1e3;
-  switch (of) {
-    case Covariate::time:
-      return {"time", "s", 1};
-    case Covariate::position:
-      return {"position", length, factor};
-    case Covariate::velocity:
-      return {"speed", length + "/s", factor};
-    case Covariate::acceleration:
-      return {"acceleration", length + "/s^2", factor};
-    case Covariate::sign:
-      break;
-  }
-  return {"direction", "1", 1};
-}
-
-/// What a law adds, per unit of what it is multiplied by.
-Shown shown_value(const Law& law) {
-  const bool rotary = is_rotary(law.axis_index());
-  Shown y;
-  switch (law.point) {
-    case Law::Point::motor_force:
-    case Law::Point::table_force:
-      y = {"force", rotary ? "N m" : "N", 1};
-      break;
-    case Law::Point::command_time:
-      y = {"time", "us", 1e6};
-      break;
-    case Law::Point::reading:
-      y = {"reading", "um", 1e6};
-      break;
-    case Law::Point::command:
-    case Law::Point::displacement:
-      y = {"displacement", rotary ? "arcsec" : "um", rotary ? 3600 / kDegree : 1e6};
-  }
-  if (law.times == Covariate::time || law.times == Covariate::sign) return y;
-  const Shown per = shown_covariate(law.times, is_rotary(static_cast<std::size_t>(law.times_axis)));
-  return {y.name, y.unit + " per " + per.unit, y.factor / per.factor};
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "diagnosis/replica/model_comparison.hpp"
+#include "diagnosis/search/freed_number.hpp"
 
 namespace vcnc {
 
@@ -45,6 +46,8 @@ Json excitation(const Excitation& e) {
   return {{"name", e.name},
           {"excited", e.excited},
           {"detection_limit", finite(e.detection_limit)},
+          {"key", e.key},
+          {"unit", unit_of_key(e.key)},
           {"program", e.program}};
 }
 

@@ -195,8 +195,9 @@ std::string excitation_section(const std::vector<Excitation>& all) {
   for (const Excitation& e : all)
     text += fmt::format(
         "<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n", escaped(e.name),
-        e.excited && std::isfinite(e.detection_limit) ? fmt::format("{:.3g}", e.detection_limit)
-                                                      : std::string("not excited"),
+        e.excited && std::isfinite(e.detection_limit)
+            ? fmt::format("{:.3g} {}", e.detection_limit, unit_of_key(e.key))
+            : std::string("not excited"),
         e.program.empty() ? std::string() : "<code>vcnc program " + escaped(e.program) + "</code>");
   return text + "</table>\n";
 }

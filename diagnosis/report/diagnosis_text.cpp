@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "diagnosis/replica/model_comparison.hpp"
+#include "diagnosis/report/shown_law.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {
@@ -122,6 +123,7 @@ std::string to_text(const Diagnosis& d) {
   for (const FittedNumber& n : d.uncertain)
     text += fmt::format("  declared as uncertain: {} = {}\n", n.key, with_interval(n));
   if (d.law && d.verdict != DiagnosisVerdict::unexplained) text += "  " + d.law->words + "\n";
+  if (d.law) text += "    " + law_numbers(*d.law) + "\n";
   text += figures_table(d.figures);
   std::size_t blind = 0;
   for (const Excitation& e : d.excitation) blind += !e.excited;

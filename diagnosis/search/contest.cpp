@@ -16,18 +16,19 @@
 namespace vcnc {
 namespace {
 
-constexpr double kHopeless = 100;   ///< times what is to be explained: a loop that is unstable
-constexpr int kGlance = 4;          ///< iterations to see what a candidate is worth
-constexpr double kUsual = 1;        ///< decades about the typical size
-constexpr double kShows = 0.02;     ///< part of a gain that a channel must have to be concerned
-constexpr double kChance = 3;       ///< standard deviations of a sum of squares
-constexpr double kNothing = 0.03;   ///< of a typical size
-constexpr double kPromise = 0.3;    ///< of what is needed: worth a refit
-constexpr double kHope = 0.5;       ///< of what is needed: worth to be refitted to the end
-constexpr double kLeaves = 0.05;    ///< part of what is left that a winner may leave
-constexpr double kNearly = 0.99;    ///< part of a gain that may be as much when all is refitted
-constexpr double kWorthAFit = 0.5;  ///< of another gain, that sensitivities must promise
-constexpr double kLongWay = 9;      ///< tolerances, where sensitivities are others
+constexpr double kHopeless = 100;      ///< times what is to be explained: a loop that is unstable
+constexpr int kGlance = 4;             ///< iterations to see what a candidate is worth
+constexpr double kUsual = 1;           ///< decades about the typical size, or of tolerances
+constexpr double kShows = 0.02;        ///< part of a gain that a channel must have to be concerned
+constexpr double kChance = 3;          ///< standard deviations of a sum of squares
+constexpr double kOfTolerances = 0.3;  ///< numbers, for a decade of tolerances more
+constexpr double kNothing = 0.03;      ///< of a typical size
+constexpr double kPromise = 0.3;       ///< of what is needed: worth a refit
+constexpr double kHope = 0.5;          ///< of what is needed: worth to be refitted to the end
+constexpr double kLeaves = 0.05;       ///< part of what is left that a winner may leave
+constexpr double kNearly = 0.99;       ///< part of a gain that may be as much when all is refitted
+constexpr double kWorthAFit = 0.5;     ///< of another gain, that sensitivities must promise
+constexpr double kLongWay = 9;         ///< tolerances, where sensitivities are others
 constexpr std::size_t kElsewhere = 2;
 constexpr std::size_t kFinalists = 3, kRivals = 4, kMoreRefits = 8;
 
@@ -272,9 +273,14 @@ void Contest::put_simplest_first(std::vector<Contender>& all) const {
   std::rotate(all.begin(), simplest, simplest + 1);
 }
 
-/// Numbers that are something, and two for every further tenth or tenfold of a usual size.
+/// Numbers that are something, and two for every further tenth or tenfold of a usual size. Of
+/// declared numbers that do the same, the one by the fewest tolerances.
 double Contest::intricacy(const Contender& c) const {
-  if (!c.released.empty()) return 1;
+  if (!c.released.empty()) {
+    const FreedNumber& n = c.numbers.front();
+    const double tolerances = std::abs(n.value - n.centre) / n.number.typical;
+    return 1 + kOfTolerances * std::max(0.0, std::log10(tolerances) - kUsual);
+  }
   double largest = 0;
   std::size_t numbers = c.numbers.size();
   for (const FreedNumber& n : c.numbers)
@@ -412,18 +418,25 @@ void Contest::refit_released(std::vector<Contender>& all, double least) const {
 }
 
 double Contest::needed_of(const Contender& c) const {
-  if (!c.released.empty()) return rules_.options.release_gain;
-  return needed_of({c.candidate}, c.fit.held_out_of);
+  if (c.released.empty()) return needed_of({c.candidate}, c.fit.held_out_of);
+  return std::max(rules_.options.release_gain,
+                  needed_at({drive_of(c.released, rules_.candidates)}, c.fit.held_out_of));
 }
 
 double Contest::needed_of(const std::vector<std::size_t>& together,
                           const std::vector<double>& after) const {
+  std::set<std::string> drives;
+  for (const std::size_t c : together)
+    if (is_of_drive(rules_.candidates[c])) drives.insert(rules_.candidates[c].place);
+  return needed_at(drives, after);
+}
+
+double Contest::needed_at(const std::set<std::string>& drives,
+                          const std::vector<double>& after) const {
   const double needed = rules_.threshold(ground_.held_out_of, after);
-  const std::set<std::string> drives = drives_found(now_, rules_.candidates);
-  if (std::none_of(together.begin(), together.end(), [&](std::size_t c) {
-        const Candidate& candidate = rules_.candidates[c];
-        return is_of_drive(candidate) && drives.contains(candidate.place);
-      }))
+  const std::set<std::string> found = drives_found(now_, rules_.candidates);
+  if (std::none_of(drives.begin(), drives.end(),
+                   [&](const std::string& drive) { return found.contains(drive); }))
     return needed;
   return std::max(
       needed, rules_.options.share_beside * rules_.left_where_gained(ground_.held_out_of, after));

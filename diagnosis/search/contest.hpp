@@ -7,6 +7,7 @@
 #pragma once
 
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -115,6 +116,8 @@ class Contest {
   /// The same of candidates that leave `after` together.
   double needed_of(const std::vector<std::size_t>& together,
                    const std::vector<double>& after) const;
+  /// The same of what is at the drives of some axes.
+  double needed_at(const std::set<std::string>& drives, const std::vector<double>& after) const;
   std::size_t candidate_of(const Screened& s) const;
 
   const ContestRules& rules_;

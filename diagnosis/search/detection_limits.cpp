@@ -168,7 +168,7 @@ std::vector<double> release_limits(const Ground& ground, const std::vector<Freed
     if (prior <= 0 || information <= 1e-6 * prior) continue;
     // What data and tolerance agree on is information / (information + prior) of the change.
     const double pulled = pull / std::sqrt(prior) * (information + prior) / information;
-    const double gained = std::sqrt(gain * (1 / prior + 1 / information));
+    const double gained = std::sqrt(gain / information);
     limits[i] = std::max(pulled, gained) * numbers[i].number.typical;
   }
   return limits;

@@ -246,18 +246,23 @@ std::set<std::string> places_found(const FittedMachine& m) {
   return places;
 }
 
+std::string drive_of(const std::string& key, const std::vector<Candidate>& candidates) {
+  const bool of_drive =
+      key.starts_with("axes.") ||
+      std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& c) {
+        return is_of_drive(c) && std::any_of(c.numbers.begin(), c.numbers.end(),
+                                             [&](const FreeNumber& n) { return n.key == key; });
+      });
+  return of_drive ? place_of(key) : "";
+}
+
 std::set<std::string> drives_found(const FittedMachine& m,
                                    const std::vector<Candidate>& candidates) {
   std::set<std::string> drives;
   for (const AddedEffect& a : m.added)
     if (is_of_drive(candidates[a.candidate])) drives.insert(candidates[a.candidate].place);
-  for (const ReleasedNumber& r : m.released) {
-    const bool of_drive = std::any_of(candidates.begin(), candidates.end(), [&](const auto& c) {
-      return is_of_drive(c) && std::any_of(c.numbers.begin(), c.numbers.end(),
-                                           [&](const auto& n) { return n.key == r.key; });
-    });
-    if (of_drive || r.key.starts_with("axes.")) drives.insert(place_of(r.key));
-  }
+  for (const ReleasedNumber& r : m.released)
+    if (const std::string drive = drive_of(r.key, candidates); !drive.empty()) drives.insert(drive);
   return drives;
 }
 
@@ -346,6 +351,7 @@ FittedMachine fit_declared(Evidence& evidence, const Machine& declared, Against 
 
 FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
                           std::vector<FreedNumber> numbers) {
+  constexpr double kShowsNothing = 0.03;  // standard deviations by a typical change
   FittedMachine m;
   m.machine = declared;
   m.nuisances.numbers = std::move(numbers);
@@ -354,7 +360,11 @@ FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
   // What the run cannot show stays at its declaration.
   LinearPart shown;
   for (std::size_t i = 0; i < m.nuisances.numbers.size(); ++i) {
-    if (m.nuisances.columns[i].zero()) continue;
+    const Column& column = m.nuisances.columns[i];
+    if (column.zero() ||
+        evidence.chi2(column, Role::fitted) + evidence.chi2(column, Role::held_out) <
+            kShowsNothing * kShowsNothing)
+      continue;
     shown.numbers.push_back(m.nuisances.numbers[i]);
     shown.columns.push_back(std::move(m.nuisances.columns[i]));
   }

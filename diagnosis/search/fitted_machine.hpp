@@ -55,6 +55,8 @@ struct FittedMachine {
 
 /// Axes and other places at which something was found.
 std::set<std::string> places_found(const FittedMachine& machine);
+/// The axis of whose drive a declared number is; empty: of none.
+std::string drive_of(const std::string& key, const std::vector<Candidate>& candidates);
 /// Axes at whose drive something was found.
 std::set<std::string> drives_found(const FittedMachine& machine,
                                    const std::vector<Candidate>& candidates);

@@ -8,6 +8,7 @@
 #include "diagnosis/report/diagnosis_figures.hpp"
 #include "diagnosis/report/diagnosis_json.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
+#include "diagnosis/report/shown_law.hpp"
 #include "diagnosis/search/freed_number.hpp"
 
 namespace vcnc::diagnosis_page_test {
@@ -33,8 +34,9 @@ Diagnosis found_backlash() {
   d.effects = {backlash()};
   d.figures = {{{SignalKind::position, kX}, "held-out laps", 3e-6, 1e-6, 0.9e-6},
                {{SignalKind::position, kC}, "test <run>", 2e-5, 1e-5, 0}};
-  d.excitation = {{"X.backlash", 0.1, true, ""},
-                  {"C.cogging", std::numeric_limits<double>::infinity(), false, "rotary"}};
+  d.excitation = {{"X.backlash", 0.1, true, "", "effects.X.backlash.gap_um"},
+                  {"C.cogging", std::numeric_limits<double>::infinity(), false, "rotary",
+                   "effects.C.cogging.amplitude_Nm"}};
   d.ladder = {{"", 5000, {3e-6}}, {"X.backlash", 1200, {1e-6}}};
   d.warnings = {"25 samples are missing"};
   return d;
@@ -57,6 +59,8 @@ TEST(DiagnosisJson, HoldsAllThatWasFoundInTheUnitsOfItsNames) {
   EXPECT_NEAR(json["figures"][0]["rms_before"].get<double>(), 3, 1e-12);
   EXPECT_EQ(json["figures"][1]["unit"], "arcsec");
   EXPECT_NEAR(json["figures"][1]["rms_after"].get<double>(), 2.0626480624709636, 1e-9);
+  EXPECT_EQ(json["excitation"][0]["key"], "effects.X.backlash.gap_um");
+  EXPECT_EQ(json["excitation"][0]["unit"], "um");
   EXPECT_TRUE(json["excitation"][1]["detection_limit"].is_null());  // infinite
   EXPECT_EQ(json["ladder"][1]["chi2"], 1200);
   EXPECT_TRUE(json["law"].is_null());
@@ -93,6 +97,8 @@ TEST(LawFigure, DrawsTheCurveWithItsBandInTheUnitsOfPages) {
   for (const char* part :
        {"-5.72958 -2 -2.5 -1.5", "5.72958 3 2 4", "speed of C  [deg/s]", "f  [um]"})
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+  EXPECT_EQ(law_numbers(learned),
+            "f is least -2 [-2.5 .. -1.5] um at -5.73 deg/s, most 3 [2 .. 4] um at 5.73 deg/s");
   learned.law.point = Law::Point::table_force;  // N per m of the position of X: N per mm
   learned.law.times = Covariate::position;
   learned.law.value = {5000, 5000};

@@ -1,0 +1,67 @@
+// Declared numbers of an axis that are no more what they were in the healthy run.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <string_view>
+
+#include "diagnosis/diagnose.hpp"
+#include "diagnosis/replica/machine_replica.hpp"
+#include "diagnosis/search/differential.hpp"
+#include "tests/diagnosis/stroke_run.hpp"
+
+namespace vcnc::declared_numbers_test {
+namespace {
+
+using stroke_run::declared;
+using stroke_run::recorded;
+
+/// What changed between a healthy run and one of `now`, of servo loops, friction and what a wave or
+/// a spring on X does.
+Diagnosis change(const Machine& now) {
+  const Record reference = recorded(declared(), 16), record = recorded(now, 17);
+  MachineReplica of_reference(reference, declared(), std::nullopt),
+      replica(record, declared(), std::nullopt);
+  const HealthyRun healthy = healthy_run_with_forces(reference, of_reference, declared());
+  const DifferentialRecord difference = less_healthy(record, healthy);
+  replica.apply(difference.unknown);
+  std::vector<Candidate> all = candidates(declared());
+  std::erase_if(all, [](const Candidate& c) {
+    static constexpr std::array<std::string_view, 7> tried{"kv_error",
+                                                           "velocity_gain_error",
+                                                           "integral_time_error",
+                                                           "torque_constant_error",
+                                                           "load_encoder_error",
+                                                           "cable_chain",
+                                                           "viscous"};
+    return c.place != "X" || std::find(tried.begin(), tried.end(), c.effect) == tried.end();
+  });
+  return diagnose({record, replica, declared(), all}, difference);
+}
+
+TEST(DeclaredNumbers, OneFarOutOfItsToleranceIsToldAndNothingElse) {
+  Machine now = declared();
+  const std::string key = "axes.X.motor_inertia_kgm2";
+  const double inertia = number_of(now, key);
+  now.effects.deviations.push_back({key, 1.08 * inertia});
+  const Diagnosis d = change(now);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
+  ASSERT_EQ(d.effects.size(), 1U);
+  EXPECT_EQ(d.effects[0].place, key);
+  EXPECT_NEAR(number_of(d.found, key), 1.08 * inertia, 0.01 * inertia);
+}
+
+TEST(DeclaredNumbers, SeveralDoNotStandForATorqueConstant) {
+  // It is both masses and all friction at once.
+  Machine now = declared();
+  now.effects.axis[kX].get<TorqueConstantError>().deviation = -0.06;
+  const Diagnosis d = change(now);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
+  ASSERT_EQ(d.effects.size(), 1U);
+  EXPECT_EQ(d.effects[0].name, "torque_constant_error");
+  EXPECT_NEAR(number_of(d.found, "effects.X.torque_constant_error.deviation_percent"), -6, 1);
+}
+
+}  // namespace
+}  // namespace vcnc::declared_numbers_test
