@@ -17,6 +17,7 @@
 #include "diagnosis/records/any_record.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
 #include "diagnosis/replica/readings_check.hpp"
+#include "diagnosis/replica/readings_time.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
 
 namespace vcnc {
@@ -32,6 +33,8 @@ int commission_command(const CommissionOptions& options) {
   check_machine_output(options.out);
   MachineReplica replica(record, declared, piece_of(declared, record));
   check_readings(record, replica.channels(), replica.predict(declared));
+  const std::vector<std::string> of_times =
+      check_reading_times(record, declared, piece_of(declared, record));
   if (replica.channels().empty())
     throw InputError(record.source + ": holds nothing that can be predicted");
   ProgressLine progress;
@@ -50,6 +53,7 @@ int commission_command(const CommissionOptions& options) {
   for (const FittedNumber& n : c.numbers)
     std::cout << fmt::format("  {} = {}\n", n.key, with_interval(n));
   std::cout << figures_table(c.figures);
+  for (const std::string& warning : of_times) std::cerr << "vcnc: " << warning << '\n';
   for (const std::string& warning : c.warnings) std::cerr << "vcnc: " << warning << '\n';
   if (stop_requested()) {
     std::cout << options.out << ": interrupted, nothing is written\n";

@@ -22,6 +22,7 @@
 #include "diagnosis/records/series.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
 #include "diagnosis/replica/readings_check.hpp"
+#include "diagnosis/replica/readings_time.hpp"
 #include "diagnosis/report/diagnosis_json.hpp"
 #include "diagnosis/report/diagnosis_page.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
@@ -124,6 +125,10 @@ void append_told(std::string sentence, std::vector<std::string>& warnings) {
   if (!sentence.empty()) warnings.push_back(std::move(sentence));
 }
 
+void append_all(const std::vector<std::string>& sentences, std::vector<std::string>& warnings) {
+  warnings.insert(warnings.end(), sentences.begin(), sentences.end());
+}
+
 bool same_values(const Record& a, const Record& b) {
   return std::equal(
       a.signals.begin(), a.signals.end(), b.signals.begin(), b.signals.end(),
@@ -138,6 +143,7 @@ bool same_values(const Record& a, const Record& b) {
 std::optional<HealthyRun> reference_run(const DiagnoseOptions& options, const Machine& declared) {
   if (options.reference.empty()) return std::nullopt;
   const Record record = load_record(options.reference, options.map, options.model);
+  check_reading_times(record, declared, piece_of(declared, record));
   return healthy_run_with_forces(record, *replica_of(record, declared), declared);
 }
 
@@ -269,15 +275,19 @@ int diagnose_command(const DiagnoseOptions& options) {
     check_same_kinematics(record, predicted);
     replica_of(predicted, declared);
     append_told(other_machine(record, predicted), of_tests);
+    append_all(check_reading_times(predicted, declared, piece_of(declared, predicted)), of_tests);
   }
   const std::string page = "report.html";
   std::filesystem::path folder;
   if (!options.out.empty()) folder = page_folder(options.out, page, kDiagnosisMark);
   const auto replica = bare ? nullptr : replica_of(record, declared);
+  std::vector<std::string> of_times;
+  if (!bare) of_times = check_reading_times(record, declared, piece_of(declared, record));
   Record seen = record;
   Diagnosis d = bare ? diagnose_quadrature(record, declared)
                      : diagnose_machine(options, record, *replica, declared, seen);
-  d.warnings.insert(d.warnings.end(), of_tests.begin(), of_tests.end());
+  append_all(of_times, d.warnings);
+  append_all(of_tests, d.warnings);
   std::cout << to_text(d);
   const int code = stop_requested() ? kExitInterrupted : kExitOk;
   if (folder.empty()) return code;
