@@ -17,6 +17,8 @@ namespace {
 constexpr double kIs = 0.95, kMayBe = 0.7;  // correlations
 constexpr double kSame = 1.03;              // of two factors
 constexpr double kDeflected = 10e-6;        // rms from which on a ball is deflected [m]
+constexpr double kTouched = 0.5e-6;         // ... from which on another unit would show [m]
+constexpr double kNoGain = 20;              // a factor that no fault makes
 
 double correlation(const std::vector<double>& x, const std::vector<double>& y) {
   double n = 0, sx = 0, sy = 0, xx = 0, yy = 0, xy = 0;
@@ -35,14 +37,14 @@ struct Reading {
 
 /// Of what is measured over what is predicted, by least squares through zero, where the one follows
 /// the other.
-std::optional<double> factor_of(const Reading& r) {
+std::optional<double> factor_of(const Reading& r, double deflected) {
   double n = 0, xx = 0, yy = 0, xy = 0;
   for (std::size_t k = 0; k < r.predicted.size(); ++k) {
     const double x = r.predicted[k], y = r.measured->value[k];
     if (!std::isfinite(x) || !std::isfinite(y)) continue;
     ++n, xx += x * x, yy += y * y, xy += x * y;
   }
-  if (!(xx > n * kDeflected * kDeflected) || xy < kIs * std::sqrt(xx * yy)) return std::nullopt;
+  if (!(xx > n * deflected * deflected) || xy < kIs * std::sqrt(xx * yy)) return std::nullopt;
   return xy / xx;
 }
 
@@ -54,7 +56,7 @@ std::string name(const MeasuredSignal& s) {
 void check_unit(const Record& record, const std::vector<Reading>& readings) {
   std::vector<double> factors;
   for (const Reading& r : readings)
-    if (const std::optional<double> factor = factor_of(r)) factors.push_back(*factor);
+    if (const std::optional<double> factor = factor_of(r, kDeflected)) factors.push_back(*factor);
   if (factors.size() < 2) return;
   const auto [least, most] = std::minmax_element(factors.begin(), factors.end());
   const std::string mistake = usual_mistake(*most);
@@ -63,6 +65,17 @@ void check_unit(const Record& record, const std::vector<Reading>& readings) {
       "{}: all readings of the probe are {:.3g} times what the machine of the model would "
       "read{}; check their unit, and the sizes of ball and piece",
       record.source, *most, mistake));
+}
+
+/// One reading in another unit than the others.
+void check_unit_of_one(const Record& record, const Reading& reading) {
+  const std::optional<double> factor = factor_of(reading, kTouched);
+  if (!factor || (*factor<kNoGain&& * factor> 1 / kNoGain)) return;
+  const std::string mistake = usual_mistake(*factor);
+  if (mistake.empty()) return;
+  throw MeasurementError(fmt::format(
+      "{}: {} is {:.3g} times what the machine of the model would read{}; check its unit and scale",
+      record.source, name(*reading.measured), *factor, mistake));
 }
 
 }  // namespace
@@ -88,6 +101,7 @@ void check_readings(const Record& record, const std::vector<ComparedChannel>& ch
         throw MeasurementError(fmt::format("{}: {} is what {} would be: the columns are swapped",
                                            record.source, name(*a.measured), name(*b.measured)));
   check_unit(record, readings);
+  for (const Reading& r : readings) check_unit_of_one(record, r);
 }
 
 }  // namespace vcnc

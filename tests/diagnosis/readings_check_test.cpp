@@ -79,6 +79,15 @@ TEST(ReadingsCheck, NamesTheMistakeThatMakesAllReadingsTooLarge) {
   EXPECT_EQ(refusal({0, 1, 2}, {2, 2, 1}), "");
 }
 
+TEST(ReadingsCheck, NamesTheOneReadingInAnotherUnit) {
+  EXPECT_EQ(refusal({0, 1, 2}, {1, 1, 1000}),
+            "run.csv: \"w\" (deflection z) is 1e+03 times what the machine of the model would read "
+            "(a factor of 1000: m and mm, or s and ms); check its unit and scale");
+  EXPECT_NE(refusal({0, 1, 2}, {25.4, 1, 1}).find("\"u\" (deflection x) is 25.4 times"),
+            std::string::npos);
+  EXPECT_EQ(refusal({0, 1, 2}, {1, 1, 10}), "");
+}
+
 TEST(ReadingsCheck, AFaultOfTheProbeIsNoSwap) {
   EXPECT_EQ(refusal({0, 1, 2}, {0.5, 2, 1}), "");
   EXPECT_EQ(refusal({0, 1, 2}, {1, 0, 1}), "");  // dead
