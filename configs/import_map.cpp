@@ -119,9 +119,11 @@ bool contains(const List& list, const T& wanted) {
   return std::find(list.begin(), list.end(), wanted) != list.end();
 }
 
-std::string own_names(const ImportMap& map) {
+/// Of axes that the map gives a name, those that may have a column of this kind.
+std::string own_names(const ImportMap& map, ColumnKind kind) {
   std::string all;
-  for (const ImportMap::Axis& a : map.axes) all += ", \"" + a.name + "\"";
+  for (const ImportMap::Axis& a : map.axes)
+    if (contains(kProbeNames, a.place) == of_probe(kind)) all += ", \"" + a.name + "\"";
   return all;
 }
 
@@ -230,7 +232,8 @@ void check_signal(const ImportMap& map, const ImportMap::Signal& s, const Refusa
   if (!s.lines.contains("kind"))
     refuse("kind",
            "is missing; allowed command, position, motor_position, load_position, twist, "
-           "velocity, force, deflection, cosine, sine, temperature, clock");
+           "velocity, force, applied_force, added_force, deflection, cosine, sine, temperature, "
+           "clock");
   if (s.sign == 0) refuse("sign", "0 is not possible, allowed 1 or -1");
   if (s.scale == 0) refuse("scale", "0 would make every value the same");
   if (of_nothing(s.kind)) {
@@ -238,15 +241,16 @@ void check_signal(const ImportMap& map, const ImportMap::Signal& s, const Refusa
     return;
   }
   if (s.axis.empty())
-    refuse("axis", fmt::format("is missing; allowed {}{}",
-                               of_probe(s.kind) ? "x, y, z" : "X, Y, Z, A, C", own_names(map)));
+    refuse("axis",
+           fmt::format("is missing; allowed {}{}", of_probe(s.kind) ? "x, y, z" : "X, Y, Z, A, C",
+                       own_names(map, s.kind)));
   const std::string_view place = place_name(map, s.axis);
   const bool fits = of_probe(s.kind) ? contains(kProbeNames, place) : contains(kAxisNames, place);
   if (!fits)
-    refuse(
-        "axis",
-        fmt::format("\"{}\" is no axis that has a {}; allowed {}{}", s.axis, to_string(s.kind),
-                    of_probe(s.kind) ? "x, y, z of the probe" : "X, Y, Z, A, C", own_names(map)));
+    refuse("axis",
+           fmt::format("\"{}\" is no axis that has a {}; allowed {}{}", s.axis, to_string(s.kind),
+                       of_probe(s.kind) ? "x, y, z of the probe" : "X, Y, Z, A, C",
+                       own_names(map, s.kind)));
 }
 
 void check_signals(const ImportMap& map, const std::string& name) {

@@ -80,6 +80,7 @@ class TextTable {
     if (text_.substr(0, 2) == "\xFF\xFE" || text_.substr(0, 2) == "\xFE\xFF")
       fail(1, "is UTF-16 text; save it as UTF-8 or ASCII");
     while (!text_.empty()) take_line();
+    if (table_.rows() == 0) check_decimals();
     if (table_.rows() == 0)
       throw MeasurementError(
           name_ + ": holds no numbers" +
@@ -94,6 +95,21 @@ class TextTable {
  private:
   [[noreturn]] void fail(std::size_t line, const std::string& reason) const {
     throw MeasurementError(fmt::format("{}:{}: {}", name_, line, reason));
+  }
+
+  /// Why no line holds numbers, where the map says that commas begin decimals.
+  void check_decimals() const {
+    if (!decimal_comma() || fields_.empty()) return;
+    if (fields_.size() == 1 && fields_[0].find(',') != std::string::npos)
+      fail(last_line_,
+           fmt::format("\"{}\" is one value where commas begin decimals, as the map says "
+                       "(decimal = \"comma\"): values must be separated by semicolons, tabs or "
+                       "spaces then",
+                       shortened(fields_[0])));
+    for (const std::string& f : fields_)
+      if (f.find('.') != std::string::npos && number(f))
+        fail(last_line_, fmt::format("\"{}\" has a decimal point; the map says decimal = \"comma\"",
+                                     shortened(f)));
   }
 
   void take_line() {
@@ -111,6 +127,7 @@ class TextTable {
     }
     if (separator_ == Separator::any) separator_ = told_separator(line);
     split(line);
+    last_line_ = line_;
     if (!begun_)
       begin();
     else if (!heading_rows_over_ && is_heading())
@@ -287,7 +304,7 @@ class TextTable {
   MeasuredTable table_;
   std::vector<std::string> fields_;
   std::string remark_;
-  std::size_t line_ = 0;
+  std::size_t line_ = 0, last_line_ = 0;
   bool begun_ = false, heading_rows_over_ = false;
 };
 

@@ -73,7 +73,8 @@ TEST(ImportMap, RefusesWithLineKeyAndWhatIsAllowed) {
       {with("[[signals]]\ncolumn = \"v\"\nkind = \"velocity\"\naxis = \"X\"\n"),
        "signals.unit: is missing"},
       {with("[[signals]]\ncolumn = \"v\"\naxis = \"X\"\nunit = \"mm\"\n"),
-       "signals.kind: is missing"},
+       "signals.kind: is missing; allowed command, position, motor_position, load_position, twist, "
+       "velocity, force, applied_force, added_force, deflection,"},
       {with("[[signals]]\ncolumn = \"d\"\nkind = \"position\"\naxis = \"Q\"\nunit = \"mm\"\n"),
        "\"Q\" is no axis that has a position; allowed X, Y, Z, A, C, \"carriage\""},
       {with("[[signals]]\ncolumn = \"d\"\nkind = \"deflection\"\naxis = \"X\"\nunit = \"um\"\n"),
@@ -100,6 +101,14 @@ TEST(ImportMap, RefusesWithLineKeyAndWhatIsAllowed) {
   for (const auto& [toml, sentence] : cases)
     EXPECT_NE(refusal(toml).find(sentence), std::string::npos)
         << "expected: " << sentence << "\nfound:    " << refusal(toml);
+}
+
+TEST(ImportMap, AllowsNoNameThatDoesNotFit) {
+  const std::string said =
+      refusal(std::string(kSound) +
+              "[[signals]]\ncolumn = \"c\"\nkind = \"cosine\"\naxis = \"carriage\"\nunit = "
+              "\"V\"\n");
+  EXPECT_TRUE(said.ends_with("no axis that has a cosine; allowed x, y, z of the probe")) << said;
 }
 
 TEST(ImportMap, EveryKeyIsInTheReference) {

@@ -71,6 +71,24 @@ TEST(MeasuredTable, DecimalCommasAreReadWhereTheMapSaysSo) {
                MeasurementError);
 }
 
+TEST(MeasuredTable, CommasThatAreNoDecimalsAreSaidWithTheirLine) {
+  const TextFormat commas{.decimal = ImportMap::Decimal::comma};
+  const auto said = [&](const std::string& text) {
+    try {
+      parse_text_table(text, "run.csv", commas);
+    } catch (const MeasurementError& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(said("t,q\n0,1.5\n1,2.5\n"),
+            "run.csv:3: \"1,2.5\" is one value where commas begin decimals, as the map says "
+            "(decimal = \"comma\"): values must be separated by semicolons, tabs or spaces then");
+  EXPECT_EQ(said("t;q\n0.5;1.5\n"),
+            "run.csv:2: \"0.5\" has a decimal point; the map says decimal = \"comma\"");
+  EXPECT_EQ(said("t;q\n0,5;1,5\n"), "");
+}
+
 TEST(MeasuredTable, ALineOfASpreadsheetTellsTheSeparator) {
   const MeasuredTable table = parse_text_table("sep=;\nt;q, of X\n0;1\n1;2\n", "run.csv");
   ASSERT_EQ(table.columns.size(), 2u);
