@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "configs/import_map.hpp"
+#include "diagnosis/quadrature.hpp"
 #include "diagnosis/records/import_table.hpp"
 #include "diagnosis/records/record_file.hpp"
 
@@ -35,6 +36,9 @@ void import_command(const ImportOptions& options) {
   write_record(record, options.out);
   std::cout << describe(record);
   for (const std::string& warning : record.warnings) std::cerr << "vcnc: " << warning << '\n';
+  if (record.machine_toml.empty() && !is_bare_encoder(record))
+    std::cout << "The map names no machine: travels, speeds, forces and inertias are not checked "
+                 "until vcnc diagnose has the model.\n";
   std::cout << "record: " << fs::absolute(options.out).string() << '\n';
 }
 

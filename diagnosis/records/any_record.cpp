@@ -6,11 +6,23 @@
 #include "analysis/recording.hpp"
 #include "configs/config.hpp"
 #include "diagnosis/records/import_table.hpp"
+#include "diagnosis/records/record_check.hpp"
 #include "diagnosis/records/record_file.hpp"
 #include "diagnosis/records/record_from_recording.hpp"
 #include "model/fingerprint.hpp"
 
 namespace vcnc {
+
+namespace {
+
+/// An import may have known no machine, or another one.
+Record checked_record(const std::string& path, const std::string& model) {
+  Record record = read_record(path);
+  if (!model.empty()) check_against(record, load_machine(model));
+  return record;
+}
+
+}  // namespace
 
 Record load_record(const std::string& path, const std::string& map, const std::string& model) {
   std::error_code ignored;
@@ -22,7 +34,7 @@ Record load_record(const std::string& path, const std::string& map, const std::s
     throw MeasurementError(path +
                            ": is neither a run's folder, a recording nor an imported record; a "
                            "table needs --map MAP.toml, which says what its columns are");
-  if (!folder && is_record_file(path)) return read_record(path);
+  if (!folder && is_record_file(path)) return checked_record(path, model);
   try {
     return record_from(RecordingReader(path));
   } catch (const RecordingError& e) {

@@ -10,6 +10,7 @@
 
 #include "configs/config.hpp"
 #include "configs/spelling.hpp"
+#include "diagnosis/records/position_jumps.hpp"
 #include "diagnosis/records/record_check.hpp"
 #include "diagnosis/records/signal_name.hpp"
 #include "diagnosis/records/stretches.hpp"
@@ -25,6 +26,10 @@ using Kind = ImportMap::Kind;
 
 /// A run of fewer samples says nothing.
 constexpr std::size_t kFewestSamples = 100;
+
+constexpr double kZeroApart = 20;      // times the span of a twist, that is none of a transmission
+constexpr double kMostTwisted = 3e-3;  ///< [m or rad] that a transmission may be twisted by
+constexpr double kLeastMoved = 1e-3;   ///< [m or rad] of one encoder that the other one shows
 
 class Importer {
  public:
@@ -233,7 +238,25 @@ class Importer {
         signal.kind = SignalKind::clock;
         break;
     }
+    if (signal.kind == SignalKind::position || signal.kind == SignalKind::command)
+      check_jumps(column, s.kind);
     record_.signals.push_back(std::move(signal));
+  }
+
+  void check_jumps(const MeasuredColumn& c, Kind kind) const {
+    const std::optional<PositionJump> jump = position_jump(c.value);
+    if (!jump) return;
+    const std::string what =
+        fmt::format("{}: \"{}\" ({})", table_.place(jump->row), c.name, to_string(kind));
+    if (jump->rows > 0)
+      throw MeasurementError(
+          fmt::format("{} is 0 in {} rows, {:.6g} before: if it was not measured there, leave the "
+                      "values empty",
+                      what, jump->rows, jump->from));
+    throw MeasurementError(
+        fmt::format("{} jumps from {:.6g} to {:.6g} and goes on from there: it wraps, and must be "
+                    "unrolled before",
+                    what, jump->from, jump->to));
   }
 
   bool commanded(std::size_t axis) const {
@@ -282,17 +305,56 @@ class Importer {
       const std::size_t closed = of.contains(Kind::position) ? of.at(Kind::position)
                                  : closed_with_load(axis)    ? l
                                                              : m;
+      if (is_copy(record_.signals[l].value, record_.signals[m].value))
+        throw MeasurementError(fmt::format(
+            "{}: \"{}\" is \"{}\" itself, value by value (but for a factor and an offset): no "
+            "transmission is that stiff; give the column of the other measuring system",
+            table_.source, record_.signals[l].source, record_.signals[m].source));
+      check_both_move(record_.signals[l], record_.signals[m]);
+      check_both_move(record_.signals[m], record_.signals[l]);
       MeasuredSignal twist;
       twist.kind = SignalKind::twist;
       twist.axis = axis;
       twist.source = record_.signals[l].source + " - " + record_.signals[m].source;
       for (std::size_t i = 0; i < base_.samples; ++i)
         twist.value.push_back(record_.signals[l].value[i] - record_.signals[m].value[i]);
+      take_zero_off(twist);
       gone.insert(closed == m ? l : m);
       record_.signals.push_back(std::move(twist));
     }
     for (auto i = gone.rbegin(); i != gone.rend(); ++i)
       record_.signals.erase(record_.signals.begin() + static_cast<std::ptrdiff_t>(*i));
+  }
+
+  void check_both_move(const MeasuredSignal& stays, const MeasuredSignal& moves) const {
+    const auto [low, high] = range_of(moves.value);
+    const double far = std::max(kLeastMoved, 0.1 * (high - low));
+    if (const auto begin = stays_while(stays.value, moves.value, far))
+      throw MeasurementError(fmt::format(
+          "{}: \"{}\" stays at {:.6g} (SI) from {:.3f} s on while \"{}\" goes on: a measuring "
+          "system that failed, or a column that was not written",
+          table_.source, stays.source, stays.value[*begin],
+          record_.begin + static_cast<double>(*begin) * record_.period, moves.source));
+  }
+
+  static std::pair<double, double> range_of(const std::vector<double>& value) {
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (const double v : value)
+      if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
+    return {low, high};
+  }
+
+  /// Two measuring systems begin to count somewhere.
+  void take_zero_off(MeasuredSignal& twist) {
+    const auto [low, high] = range_of(twist.value);
+    const double middle = 0.5 * (low + high);
+    if (!(std::abs(middle) > std::max(kMostTwisted, kZeroApart * (high - low)))) return;
+    for (double& v : twist.value) v -= middle;
+    warn(fmt::format(
+        "\"{}\" is {:.6g} {} and changes by {:.3g} only: the two measuring systems have zeros of "
+        "their own; their difference is taken off, and what twists {} all the time with it",
+        twist.source, middle, is_rotary(twist.axis) ? "rad" : "m", high - low,
+        kAxisNames[twist.axis]));
   }
 
   void cut() {
@@ -320,7 +382,7 @@ class Importer {
       const auto last = static_cast<double>(base_.samples);
       if (to <= 0 || from >= last)
         refuse(lap.lines, "laps.", "from_s",
-               fmt::format("the lap lies outside the run, {:.6g} .. {:.6g} s", base_.begin,
+               fmt::format("the lap lies outside the run, {:.3f} .. {:.3f} s", base_.begin,
                            base_.begin + (last - 1) * base_.period));
       const std::string name = lap.condition.empty()
                                    ? fmt::format("lap {}", record_.stretches.size() + 1)

@@ -10,7 +10,9 @@
 #include <utility>
 
 #include "diagnosis/records/commanded_motion.hpp"
+#include "diagnosis/records/frozen_check.hpp"
 #include "diagnosis/records/measured_table.hpp"
+#include "diagnosis/records/position_jumps.hpp"
 #include "diagnosis/records/signal_name.hpp"
 
 namespace vcnc {
@@ -34,6 +36,7 @@ constexpr std::size_t kFewestSteps = 500;
 constexpr double kCarries = 0.5;        ///< share of a twist that comes from what the load needs
 constexpr double kCarriesPart = 0.005;  ///< ... from its inertia, and from its friction
 constexpr double kImpossible = 1e4;     ///< times a declared inertia, which no machine is off by
+constexpr double kOfRounding = 1e-9;    ///< share of a span, by which two copies may differ
 constexpr double kFarAway = 3;          // times all that lies together
 
 struct Spread {
@@ -106,7 +109,9 @@ class Checker {
       : record_(record), velocities_(velocities), declared_(declared), half_(half_width(record)) {}
 
   void run() {
+    take_out_frozen(record_);
     check_values();
+    check_poses();
     for (const MeasuredSignal& v : velocities_) check_velocity(v);
     for (const MeasuredSignal& s : record_.signals) {
       if (s.kind == SignalKind::position)
@@ -117,6 +122,13 @@ class Checker {
       if (s.kind == SignalKind::force) check_force(s);
   }
 
+  void run_declared() {
+    for (const MeasuredSignal& s : record_.signals) {
+      if (s.kind == SignalKind::position || s.kind == SignalKind::command) check_range(s);
+      if (s.kind == SignalKind::force) check_force(s);
+    }
+  }
+
  private:
   /// Of the smoothing, but never more than a fiftieth of the run.
   static std::size_t half_width(const Record& record) {
@@ -125,7 +137,10 @@ class Checker {
         std::clamp(wanted, 1.0, std::max(1.0, static_cast<double>(record.samples()) / 100)));
   }
 
-  void warn(const std::string& sentence) { record_.warnings.push_back(sentence); }
+  void warn(const std::string& sentence) {
+    std::vector<std::string>& told = record_.warnings;
+    if (std::find(told.begin(), told.end(), sentence) == told.end()) told.push_back(sentence);
+  }
   [[noreturn]] void refuse(const std::string& sentence) const {
     throw MeasurementError(record_.source + ": " + sentence);
   }
@@ -231,6 +246,20 @@ class Checker {
           fmt::format("a run of {:.3g} s is short; effects of the drives need some seconds of "
                       "motion",
                       seconds));
+  }
+
+  /// Where the ball is, all axes say.
+  void check_poses() {
+    const auto known = [&](std::size_t axis) { return motion(axis) != nullptr; };
+    if (std::none_of(record_.signals.begin(), record_.signals.end(),
+                     [](const MeasuredSignal& s) { return s.kind == SignalKind::deflection; }) ||
+        (known(kX) && known(kY) && known(kZ)))
+      return;
+    std::string missing;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      if (!known(axis)) missing += (missing.empty() ? "" : ", ") + std::string(kAxisNames[axis]);
+    warn("readings of the probe are there, but neither command nor position of " + missing +
+         ": they are taken to stand where the machine of the model starts");
   }
 
   /// Equal extremes in a row, many more than a quantised signal has there by itself.
@@ -350,20 +379,12 @@ class Checker {
   /// From where on, and how far, a command goes while its position stays as it is.
   void check_stuck(const MeasuredSignal& s, const MeasuredSignal& command) const {
     const double enough = std::max(10 * kMoves, 0.1 * spread_of(command.value).span());
-    std::size_t begin = 0;
-    Spread gone;
-    for (std::size_t k = 0; k < s.value.size(); ++k) {
-      if (k == 0 || s.value[k] != s.value[k - 1]) begin = k, gone = {};
-      if (!std::isfinite(command.value[k])) continue;
-      gone.low = std::min(gone.low, command.value[k]);
-      gone.high = std::max(gone.high, command.value[k]), ++gone.count;
-      if (gone.span() > enough)
-        refuse(fmt::format(
-            "{} stays at {:.6g} from {:.3f} s on while {} goes on: a measuring system "
-            "that failed, or a column that was not written",
-            name(s), s.value[k], record_.begin + static_cast<double>(begin) * record_.period,
-            name(command)));
-    }
+    if (const auto begin = stays_while(s.value, command.value, enough))
+      refuse(
+          fmt::format("{} stays at {:.6g} from {:.3f} s on while {} goes on: a measuring system "
+                      "that failed, or a column that was not written",
+                      name(s), s.value[*begin],
+                      record_.begin + static_cast<double>(*begin) * record_.period, name(command)));
   }
 
   void check_command(const MeasuredSignal& s) {
@@ -380,6 +401,7 @@ class Checker {
       return;
     }
     check_stuck(s, *own);
+    check_measured(s, *own);
     const Series moved = speed_of(s);
     const Relation r = relate(speed_of(*own), moved);
     if (!r.known) return;
@@ -403,6 +425,15 @@ class Checker {
     }
     warn(fmt::format("{} hardly follows {} (correlation of their speeds {:.2f})", name(s),
                      name(*own), r.correlation));
+  }
+
+  /// No drive follows without error.
+  void check_measured(const MeasuredSignal& s, const MeasuredSignal& command) const {
+    if (spread_of(command.value).span() > kMoves && is_copy(s.value, command.value))
+      refuse(
+          fmt::format("{} is {} itself, value by value (but for a factor and an offset): no drive "
+                      "follows without error; give the column of the measuring system",
+                      name(s), name(command)));
   }
 
   void tell_no_command(std::size_t axis) {
@@ -581,6 +612,14 @@ class Checker {
 
 }  // namespace
 
+bool is_copy(const std::vector<double>& value, const std::vector<double>& of) {
+  const Relation r = relate(of, value);
+  if (!r.known) return false;
+  Series off = value;
+  for (std::size_t k = 0; k < off.size(); ++k) off[k] -= r.slope * of[k];
+  return spread_of(off).span() < kOfRounding * spread_of(value).span();
+}
+
 std::string usual_mistake(double factor) {
   struct Known {
     double factor;
@@ -640,6 +679,11 @@ double resolution_of(const std::vector<double>& value) {
 void check_record(Record& record, const std::vector<MeasuredSignal>& velocities,
                   const Machine* declared) {
   Checker(record, velocities, declared).run();
+}
+
+void check_against(Record& record, const Machine& declared) {
+  const std::vector<MeasuredSignal> none;
+  Checker(record, none, &declared).run_declared();
 }
 
 }  // namespace vcnc

@@ -9,12 +9,14 @@
 //               be 1 within 10 %, the correlation above 0.7
 //   command     correlation of the position's steps with those of every axis' command; the slope of
 //               what it is ahead over the command's velocity: 2 ms at most
-//               a position that stays while its command goes on
+//               a position that stays while its command goes on, or that is the command itself:
+//               residual of the regression below 1e-9 of its span
 //   twist       its span against that of the position: half at most; what it is behind as a part of
 //               the velocity: 0.2 ms at most
 //   force       least squares F = M a + B v + C sgn(v) + D (band-limited): M against the declared
 //               mass, the share that is explained, the sign; five times the declared limit at most
 //   range       positions against the declared travel, speeds against the declared limit
+//   frozen      forces and readings that were not updated (frozen_check.hpp): they become missing
 //   values      constant, saturated (equal extremes in a row), quantised (step of the values),
 //               missing samples, single ones far off both neighbours
 #pragma once
@@ -31,6 +33,14 @@ namespace vcnc {
 /// that only serve to check; `declared` may be null.
 void check_record(Record& record, const std::vector<MeasuredSignal>& velocities,
                   const Machine* declared);
+
+/// What of that needs a machine, where the record was made without one or for another: ranges,
+/// speeds, forces and inertias. Warnings that the record has already are not repeated.
+void check_against(Record& record, const Machine& declared);
+
+/// Whether one series is the other, but for a factor and an offset, as nothing that was measured
+/// is.
+bool is_copy(const std::vector<double>& value, const std::vector<double>& of);
 
 /// The usual mistake that makes a factor of this size, to be added to a message; empty: none does.
 std::string usual_mistake(double factor);

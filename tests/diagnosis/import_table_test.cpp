@@ -228,7 +228,7 @@ TEST(ImportTable, RoundingOfADifferenceIsNoResolution) {
     if (c.name == "pos" || c.name == "pos2")
       for (std::size_t k = 0; k < c.value.size(); ++k)
         c.value[k] = 1e-6 * std::round(1e6 * LinearAxis::position(kStep * static_cast<double>(k))) +
-                     (c.name == "pos2" ? 3e-6 : 0);
+                     (c.name == "pos2" ? (k % 3 == 0 ? 3e-6 : 2e-6) : 0);
   const Record record = imported(
       kTime + signal("pos", "motor_position", "X", "m") + signal("pos2", "load_position", "X", "m"),
       table);
@@ -485,6 +485,207 @@ TEST(Resolution, IsTheStepOfQuantisedValuesAndNothingOfSmoothOnes) {
   EXPECT_NEAR(resolution_of(quantised), 0.25e-3, 1e-9);
   EXPECT_EQ(resolution_of(smooth), 0);
   EXPECT_EQ(resolution_of(std::vector<double>(100, 1.0)), 0);
+}
+
+/// With other values in one column, without noise.
+MeasuredTable with_column(const std::string& name, const std::function<double(double)>& f) {
+  MeasuredTable table = table_of(columns());
+  for (MeasuredColumn& c : table.columns)
+    if (c.name == name)
+      for (std::size_t k = 0; k < kRows; ++k) c.value[k] = f(kStep * static_cast<double>(k));
+  return table;
+}
+
+std::string move_map() {
+  return kTime + signal("cmd", "command", "X", "m") + signal("pos", "position", "X", "m");
+}
+
+TEST(ImportTable, APositionThatIsTheCommandIsRefused) {
+  MeasuredTable table = table_of(columns());
+  const auto copied = [&](double scale, double noise) {
+    for (MeasuredColumn& c : table.columns)
+      if (c.name == "pos")
+        for (std::size_t k = 0; k < kRows; ++k)
+          c.value[k] = scale * table.columns[0].value[k] + (k % 2 == 0 ? noise : 0);
+    return refusal(move_map(), table);
+  };
+  ASSERT_EQ(table.columns[0].name, "cmd");
+  EXPECT_NE(copied(1, 0).find("\"pos\" (position X) is \"cmd\" (command X) itself"),
+            std::string::npos);
+  EXPECT_NE(copied(1.01, 0).find("no drive follows without error"), std::string::npos);
+  EXPECT_EQ(copied(1, 1e-8), "");  // a drive that is off by 10 nm
+}
+
+TEST(ImportTable, TwoEncodersThatAreOneColumnAreRefused) {
+  MeasuredTable table = table_of(columns());
+  const std::vector<double> motor = table.columns[0].value;  // cmd
+  const auto said = [&](double noise) {
+    for (MeasuredColumn& c : table.columns)
+      if (c.name == "pos")
+        for (std::size_t k = 0; k < kRows; ++k)
+          c.value[k] = 0.001 + motor[k] + (k % 2 == 0 ? noise : 0);
+    return refusal(kTime + signal("cmd", "motor_position", "X", "m") +
+                       signal("pos", "load_position", "X", "m"),
+                   table);
+  };
+  EXPECT_NE(said(0).find("\"pos\" is \"cmd\" itself"), std::string::npos) << said(0);
+  EXPECT_EQ(said(1e-8), "");
+}
+
+TEST(ImportTable, ForcesThatWereNotUpdatedBecomeMissing) {
+  MeasuredTable frozen = table_of(columns());
+  for (MeasuredColumn& c : frozen.columns)
+    if (c.name == "force") std::fill(c.value.begin() + 2400, c.value.begin() + 3000, c.value[2400]);
+  const Record record = imported(sound_map(), frozen);
+  EXPECT_TRUE(warned(record, "\"force\" (force X) stays to the last digit at"))
+      << all_warnings(record);
+  EXPECT_TRUE(warned(record, "from 2.400 to 3.000 s")) << all_warnings(record);
+  const std::vector<double>& force = record.find(SignalKind::force, 0)->value;
+  EXPECT_TRUE(std::isnan(force[2500]));
+  EXPECT_TRUE(std::isfinite(force[2399]) && std::isfinite(force[3000]));
+  // Coarse, limited, and at rest: nothing of that is frozen.
+  for (const auto& f : std::vector<std::function<double(double)>>{
+           [](double t) { return 20 * std::round(LinearAxis::force(t - 0.004) / 20); },
+           [](double t) { return std::clamp(LinearAxis::force(t - 0.004), -50.0, 40.0); },
+           [](double t) { return std::round(LinearAxis::force(t - 0.004)); }})
+    EXPECT_FALSE(warned(imported(sound_map(), with_column("force", f)), "last digit"));
+}
+
+/// A ball in a ring: x and y go round, z stays.
+MeasuredTable table_of_readings(double noise, const std::function<bool(double)>& touches) {
+  std::mt19937 random(3);
+  MeasuredTable table{.source = "run.csv", .columns = {}, .line = {}, .notes = {}};
+  const std::vector<std::string> names{"cx", "cy", "cz", "dx", "dy", "dz"};
+  for (const std::string& name : names) {
+    MeasuredColumn& c = table.columns.emplace_back();
+    c.name = name;
+    for (std::size_t k = 0; k < kRows; ++k) {
+      const double t = kStep * static_cast<double>(k), turn = 2 * kPi * t / 3;
+      const double way = name[1] == 'x' ? std::cos(turn) : name[1] == 'y' ? std::sin(turn) : 0;
+      const double off = noise * (static_cast<double>(random()) / 4294967296.0 - 0.5);
+      c.value.push_back(name[0] == 'c' ? 0.05 * way : off + (touches(t) ? 2e-4 * way : 0));
+    }
+  }
+  return table;
+}
+
+std::string readings_map() {
+  std::string map = "[time]\nrate_hz = 1000\n";
+  for (const char* axis : {"X", "Y", "Z"})
+    map += signal("c" + std::string(1, static_cast<char>(axis[0] + 32)), "command", axis, "m");
+  for (const char* axis : {"x", "y", "z"})
+    map += signal("d" + std::string(axis), "deflection", axis, "m");
+  return map;
+}
+
+TEST(ImportTable, ReadingsThatWereNotUpdatedBecomeMissing) {
+  const auto always = [](double) { return true; };
+  MeasuredTable table = table_of_readings(1e-8, always);
+  ASSERT_EQ(table.columns[3].name, "dx");
+  std::vector<double>& dx = table.columns[3].value;
+  std::fill(dx.begin() + 1000, dx.begin() + 1500, dx[1000]);
+  std::fill(dx.begin() + 5000, dx.end(), dx[5000]);
+  const Record record = imported(readings_map(), table);
+  EXPECT_TRUE(warned(record, "\"dx\" (deflection x) stays to the last digit"))
+      << all_warnings(record);
+  EXPECT_TRUE(warned(record, "from 1.000 to 1.500 s, at")) << all_warnings(record);
+  EXPECT_TRUE(warned(record, "from 5.000 to 6.000 s while")) << all_warnings(record);
+  EXPECT_TRUE(warned(record, "these 1500 samples are taken as missing")) << all_warnings(record);
+  EXPECT_TRUE(std::isnan(record.find(SignalKind::deflection, 0)->value[1200]));
+  // Without noise: a ball that is off the piece reads the same all the time.
+  const auto now_and_then = [](double t) { return t > 1 && (t < 2.5 || t > 3.5) && t < 5; };
+  for (const auto& touches : {std::function<bool(double)>(always), {now_and_then}}) {
+    const Record sound = imported(readings_map(), table_of_readings(0, touches));
+    EXPECT_FALSE(warned(sound, "last digit")) << all_warnings(sound);
+  }
+}
+
+TEST(ImportTable, ReadingsWithoutAllLinearAxesAreTold) {
+  const auto always = [](double) { return true; };
+  std::string map = readings_map();
+  EXPECT_FALSE(warned(imported(map, table_of_readings(1e-8, always)), "neither command"));
+  const std::string cz = signal("cz", "command", "Z", "m");
+  map.erase(map.find(cz), cz.size());
+  const Record record = imported(map, table_of_readings(1e-8, always));
+  EXPECT_TRUE(warned(record, "neither command nor position of Z, A, C")) << all_warnings(record);
+}
+
+TEST(ImportTable, APositionThatWrapsIsRefused) {
+  const auto wraps = [](double t) { return std::remainder(4 * LinearAxis::position(t), 0.1); };
+  const std::string said = refusal(move_map(), with_column("pos", wraps));
+  EXPECT_NE(said.find("\"pos\" (position) jumps from"), std::string::npos) << said;
+  EXPECT_NE(said.find("it wraps, and must be unrolled before"), std::string::npos) << said;
+  // A jump that is made in one sample from rest to rest.
+  const auto step = [](double t) { return t > 3 ? 0.1 : 0.0; };
+  EXPECT_EQ(refusal(kTime + signal("pos", "command", "X", "m") + signal("force", "force", "X", "N"),
+                    with_column("pos", step))
+                .find("wraps"),
+            std::string::npos);
+}
+
+TEST(ImportTable, ZerosWithinAPositionAreRefused) {
+  const auto zeros = [](double t) { return t > 0.5 && t < 0.6 ? 0 : LinearAxis::position(t); };
+  const std::string said = refusal(move_map(), with_column("pos", zeros));
+  EXPECT_NE(said.find("run.csv:503: \"pos\" (position) is 0 in 99 rows, 0.08 before"),
+            std::string::npos)
+      << said;
+  // An axis that stands at zero, and goes through it.
+  const auto stands = [](double t) { return t < 2 ? 0 : LinearAxis::position(t - 0.004); };
+  EXPECT_EQ(refusal(kTime + signal("pos", "position", "X", "m"), with_column("pos", stands)), "");
+}
+
+/// Robots: each encoder counts from where it was switched on.
+TEST(ImportTable, ZerosOfTwoEncodersAreTakenOff) {
+  const auto with = [](double apart) {
+    Columns all = columns();
+    all["motor"] = [](double t) { return LinearAxis::position(t) + LinearAxis::force(t) / 2e7; };
+    all["load"] = [apart](double t) { return LinearAxis::position(t) + apart; };
+    return imported(kTime + signal("motor", "motor_position", "X", "m") +
+                        signal("load", "load_position", "X", "m"),
+                    table_of(all));
+  };
+  const Record apart = with(0.05), together = with(1e-5);
+  EXPECT_TRUE(warned(apart, "\"load - motor\" is 0.05 m and changes by")) << all_warnings(apart);
+  EXPECT_NEAR(apart.find(SignalKind::twist, 0)->value[1000],
+              together.find(SignalKind::twist, 0)->value[1000] - 1e-5, 2e-6);
+  EXPECT_FALSE(warned(together, "zeros of their own")) << all_warnings(together);
+}
+
+TEST(ImportTable, AnEncoderThatStopsWhileTheOtherGoesOnIsRefused) {
+  MeasuredTable table = table_of(columns());
+  for (MeasuredColumn& c : table.columns)
+    if (c.name == "pos") std::fill(c.value.begin() + 3000, c.value.end(), c.value[3000]);
+  const std::string said = refusal(
+      kTime + signal("cmd", "motor_position", "X", "m") + signal("pos", "load_position", "X", "m"),
+      table);
+  EXPECT_NE(said.find("from 3.000 s on while \"cmd\" goes on"), std::string::npos) << said;
+}
+
+/// What was imported without a machine is checked when there is one.
+TEST(ImportTable, ChecksAgainstAMachineAreMadeLater) {
+  const auto later = [](const std::string& scale) -> std::string {
+    const std::string map = kTime + signal("cmd", "command", "X", "m", scale) +
+                            signal("pos", "position", "X", "m", scale) +
+                            signal("force", "force", "X", "N");
+    Record record =
+        import_table(table_of(columns()), parse_import_map(map, "map.toml"), "map.toml", nullptr);
+    record.warnings.clear();
+    try {
+      check_against(record, declared());
+      const std::string once = all_warnings(record);
+      check_against(record, declared());
+      EXPECT_EQ(all_warnings(record), once);
+      return once;
+    } catch (const MeasurementError& e) {
+      return e.what();
+    }
+  };
+  EXPECT_NE(later("scale = 1000").find("the declared travel is 0.3 m; a factor of 1000"),
+            std::string::npos)
+      << later("scale = 1000");
+  EXPECT_EQ(later(""), "");
+  EXPECT_NE(later("offset = 0.1").find("outside the declared travel"), std::string::npos)
+      << later("offset = 0.1");
 }
 
 class RecordFile : public testing::Test {
