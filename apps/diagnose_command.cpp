@@ -149,6 +149,9 @@ std::optional<HealthyRun> reference_run(const DiagnoseOptions& options, const Ma
 
 int compare_models(const DiagnoseOptions& options, const Record& record, const Machine& declared) {
   const Machine found = load_machine(options.compare);
+  for (const std::string& warning :
+       check_reading_times(record, declared, piece_of(declared, record)))
+    std::cerr << "vcnc: " << warning << '\n';
   std::vector<SignalFigure> figures;
   const std::optional<HealthyRun> healthy = reference_run(options, declared);
   const Machine& before = healthy ? healthy->machine : declared;

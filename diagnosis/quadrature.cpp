@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "diagnosis/quadrature_lag.hpp"
 #include "model/parameters.hpp"
 
 namespace vcnc {
@@ -534,8 +535,18 @@ Diagnosis diagnose_quadrature(const Record& record, const Machine& declared) {
     if (cosine.kind != SignalKind::cosine || cosine.axis > 2) continue;
     const MeasuredSignal* sine = record.find(SignalKind::sine, cosine.axis);
     if (!sine) continue;
-    ChannelFit data(cosine, *sine);
     const char name = kComponent[cosine.axis];
+    if (const auto lag = sine_lag(cosine.value, sine->value)) {
+      d.warnings.push_back(fmt::format(
+          "channel {}: the {} comes {} samples ({:.3g} ms) after the {}, as a phase in proportion "
+          "to the speed says; shifted by that, {:.0f} % of what is off an ellipse is left. Put the "
+          "two columns on one time",
+          name, lag->samples > 0 ? "sine" : "cosine", std::abs(lag->samples),
+          1e3 * static_cast<double>(std::abs(lag->samples)) * record.period,
+          lag->samples > 0 ? "cosine" : "sine", 100 * lag->left));
+      continue;
+    }
+    ChannelFit data(cosine, *sine);
     if (data.size() < kFewest) {
       d.warnings.push_back(fmt::format("channel {}: {} samples are too few, {} are needed", name,
                                        data.size(), kFewest));

@@ -18,6 +18,9 @@
 // along the record is taken out: by straight lines between the means of the distance over parts of
 // eight periods and more.
 //
+// A channel whose sine and cosine were sampled at different times (quadrature_lag.hpp) is told and
+// left out.
+//
 // What moves samples along the curve only cannot be seen: a fifth harmonic (cos 5phi, sin 5phi) has
 // the distance cos 4phi of a third one.
 #pragma once

@@ -60,6 +60,29 @@ TEST(Quadrature, ASoundEncoderIsNotAccused) {
   }
 }
 
+TEST(Quadrature, ASignalThatIsSampledLateIsNoPhase) {
+  for (const std::ptrdiff_t lag : {3, -50}) {
+    Record record = encoder({}, 3);
+    std::vector<double>& sine = record.signals[1].value;
+    if (lag > 0)
+      std::rotate(sine.begin(), sine.end() - lag, sine.end());
+    else
+      std::rotate(sine.begin(), sine.begin() - lag, sine.end());
+    const Diagnosis d = diagnose_quadrature(record, Machine{});
+    EXPECT_EQ(d.verdict, DiagnosisVerdict::not_identifiable);
+    EXPECT_TRUE(d.effects.empty());
+    ASSERT_EQ(d.warnings.size(), 1u);
+    EXPECT_TRUE(d.warnings[0].starts_with(
+        lag > 0 ? "channel x: the sine comes 3 samples (3 ms) after the cosine"
+                : "channel x: the cosine comes 50 samples (50 ms) after the sine"))
+        << d.warnings[0];
+  }
+  for (const SignalCurve& sound :
+       {SignalCurve{.angle = 20 * kDegree}, {.second = 0.1, .third = -0.1}, {.gain = 0.3}})
+    EXPECT_NE(diagnose_quadrature(encoder(sound, 4), Machine{}).verdict,
+              DiagnosisVerdict::not_identifiable);
+}
+
 TEST(Quadrature, FindsEachEffectAloneWithItsNumbers) {
   const std::vector<std::pair<std::string, SignalCurve>> cases{
       {"signal_offset", {.cosine_offset = 0.03, .sine_offset = -0.02}},
