@@ -37,7 +37,11 @@ constexpr double kCarries = 0.5;        ///< share of a twist that comes from wh
 constexpr double kCarriesPart = 0.005;  ///< ... from its inertia, and from its friction
 constexpr double kImpossible = 1e4;     ///< times a declared inertia, which no machine is off by
 constexpr double kOfRounding = 1e-9;    ///< share of a span, by which two copies may differ
-constexpr double kFarAway = 3;          // times all that lies together
+constexpr double kMostForceLag = 0.2;   ///< [s] either way
+constexpr double kForceLag = 6e-3;      ///< [s] that lags of a current loop and filters make
+constexpr double kLateLeaves = 4;       // times less, at another time
+constexpr long kSamplesOfForce = 20'000;
+constexpr double kFarAway = 3;  // times all that lies together
 
 struct Spread {
   double low = HUGE_VAL, high = -HUGE_VAL;
@@ -509,26 +513,46 @@ class Checker {
     double dry_explains = 0;      ///< ... that is lost without dry friction
   };
 
+  /// What a force is compared with, all in one band.
+  struct ForceSeries {
+    Series velocity, acceleration, force;
+    double fastest = 0;
+  };
+
+  ForceSeries force_series(const MeasuredSignal& force, const MeasuredSignal& position) const {
+    ForceSeries s;
+    s.velocity = speed_of(position);
+    s.acceleration = smoothed(slope_of(s.velocity, record_.period), half_);
+    s.force = smoothed(smoothed(force.value, half_), half_);
+    for (const double x : s.velocity)
+      if (std::isfinite(x)) s.fastest = std::max(s.fastest, std::abs(x));
+    return s;
+  }
+
   std::optional<ForceFit> fit_force(const MeasuredSignal& force,
                                     const MeasuredSignal& position) const {
-    const Series v = speed_of(position);
-    const Series a = smoothed(slope_of(v, record_.period), half_);
-    const Series f = smoothed(smoothed(force.value, half_), half_);
-    double fastest = 0;
-    for (const double x : v)
-      if (std::isfinite(x)) fastest = std::max(fastest, std::abs(x));
+    return fit_force(force_series(force, position));
+  }
+
+  /// With a force that is `late` samples behind, at every so many samples; the same ones whatever
+  /// it is, up to `most`.
+  static std::optional<ForceFit> fit_force(const ForceSeries& s, long late = 0, long most = 0,
+                                           long stride = 1) {
+    const Series &v = s.velocity, &a = s.acceleration;
     Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
     Eigen::Vector4d right = Eigen::Vector4d::Zero();
     double square = 0, sum = 0, n = 0;
-    for (std::size_t k = 0; k < f.size(); ++k) {
-      if (!std::isfinite(a[k]) || !std::isfinite(f[k]) || !std::isfinite(v[k]) ||
-          std::abs(v[k]) < 0.02 * fastest)
+    for (long i = most; i < static_cast<long>(v.size()) - most; i += stride) {
+      const auto k = static_cast<std::size_t>(i);
+      const double f = s.force[static_cast<std::size_t>(i + late)];
+      if (!std::isfinite(a[k]) || !std::isfinite(f) || !std::isfinite(v[k]) ||
+          std::abs(v[k]) < 0.02 * s.fastest)
         continue;
       const Eigen::Vector4d row(a[k], v[k], v[k] > 0 ? 1 : -1, 1);
       normal += row * row.transpose();
-      right += row * f[k];
-      square += f[k] * f[k];
-      sum += f[k];
+      right += row * f;
+      square += f * f;
+      sum += f;
       ++n;
     }
     const double variance = square - sum * sum / std::max(n, 1.0);
@@ -562,6 +586,40 @@ class Checker {
                     rotary ? "torque_limit_Nm" : "force_limit_N"));
   }
 
+  /// The force that a motion needs comes when it is needed.
+  void check_force_time(const MeasuredSignal& force, const MeasuredSignal& position) {
+    const ForceSeries series = force_series(force, position);
+    const long most = samples_of(kMostForceLag), known = samples_of(kForceLag),
+               coarse = std::max(1L, samples_of(kForceLag / 2));
+    const auto n = static_cast<long>(force.value.size());
+    if (n < 10 * most) return;
+    const long stride = std::max(1L, n / kSamplesOfForce);
+    double least = 1, least_known = 1;
+    long best = 0;
+    const auto look = [&](long late) {
+      const auto fit = fit_force(series, late, most, stride);
+      const double left = fit ? 1 - fit->explained : 1;
+      if (left < least) least = left, best = late;
+      if (std::abs(late) <= known) least_known = std::min(least_known, left);
+    };
+    for (long late = -most; late <= most; late += coarse) look(late);
+    const long about = best;
+    for (long late = about - coarse; late <= about + coarse; ++late)
+      if (std::abs(late) <= most) look(late);
+    for (const long late : {-known, 0L, known}) look(late);
+    if (std::abs(best) <= known || std::abs(best) == most || least > 1 - kFits ||
+        kLateLeaves * least > least_known)
+      return;
+    warn(fmt::format(
+        "{} is {:.0f} ms {} for what {} does: mass and friction explain {:.0f} % of it then, "
+        "{:.0f} % as it is; put its time right",
+        name(force), 1e3 * static_cast<double>(std::abs(best)) * record_.period,
+        best > 0 ? "late" : "early", name(position), std::floor(100 * (1 - least)),
+        std::floor(100 * (1 - least_known))));
+  }
+
+  long samples_of(double time) const { return std::lround(time / record_.period); }
+
   void check_force(const MeasuredSignal& s) {
     check_force_limit(s);
     const MeasuredSignal* own = motion(s.axis);
@@ -591,6 +649,7 @@ class Checker {
     if (fit->dry < 0 && fit->viscous < 0 && fit->mass_explains < 0.1)
       warn(fmt::format("{} helps the motion of {} instead of braking it; check its sign", name(s),
                        name(*own)));
+    check_force_time(s, *own);
     if (!declared_ || fit->mass_explains < 0.1) return;
     const double ratio = fit->mass / declared_->axes[s.axis].mechanics.total_inertia();
     if (ratio < 5 && ratio > 0.2) return;

@@ -14,7 +14,8 @@
 //   twist       its span against that of the position: half at most; what it is behind as a part of
 //               the velocity: 0.2 ms at most
 //   force       least squares F = M a + B v + C sgn(v) + D (band-limited): M against the declared
-//               mass, the share that is explained, the sign; five times the declared limit at most
+//               mass, the share that is explained, the sign; five times the declared limit at most;
+//               6 ms late or early at most, where another time leaves a quarter of it
 //   range       positions against the declared travel, speeds against the declared limit
 //   frozen      forces and readings that were not updated (frozen_check.hpp): they become missing
 //   values      constant, saturated (equal extremes in a row), quantised (step of the values),

@@ -551,6 +551,29 @@ TEST(ImportTable, ForcesThatWereNotUpdatedBecomeMissing) {
     EXPECT_FALSE(warned(imported(sound_map(), with_column("force", f)), "last digit"));
 }
 
+/// With a motion of more than one frequency; of one alone a time looks like a friction.
+TEST(ImportTable, AForceThatIsRecordedLateIsSuspicious) {
+  const auto way = [](double t) { return 0.08 * std::sin(kPi * t) + 0.01 * std::sin(5 * kPi * t); };
+  const auto late = [&](double by, double sign) {
+    Columns all = columns();
+    all["pos"] = way;
+    all["force"] = [=](double at) {
+      const double t = at - by;
+      const double v = kPi * (0.08 * std::cos(kPi * t) + 0.05 * std::cos(5 * kPi * t));
+      const double a = -kPi * kPi * (0.08 * std::sin(kPi * t) + 0.25 * std::sin(5 * kPi * t));
+      return sign * (90 * a + 20 * std::tanh(v / 1e-3));
+    };
+    return imported(kTime + signal("pos", "position", "X", "m") +
+                        signal("force", "force", "X", "N", sign < 0 ? "sign = -1" : ""),
+                    table_of(all));
+  };
+  EXPECT_TRUE(warned(late(0.03, 1), "\"force\" (force X) is 30 ms late for what \"pos\""))
+      << all_warnings(late(0.03, 1));
+  EXPECT_TRUE(warned(late(-0.02, -1), "is 20 ms early")) << all_warnings(late(-0.02, -1));
+  EXPECT_FALSE(warned(late(0, 1), "put its time right")) << all_warnings(late(0, 1));
+  EXPECT_FALSE(warned(late(0.004, 1), "put its time right"));
+}
+
 /// A ball in a ring: x and y go round, z stays.
 MeasuredTable table_of_readings(double noise, const std::function<bool(double)>& touches) {
   std::mt19937 random(3);
