@@ -277,8 +277,14 @@ class Importer {
   }
 
   /// The only position of an axis must be that of its loop.
-  void check_one_position(std::size_t axis, Kind kind) const {
-    if (kind == Kind::position || !declared_ || !commanded(axis)) return;
+  void check_one_position(std::size_t axis, Kind kind) {
+    if (kind == Kind::position || !commanded(axis)) return;
+    if (!declared_)
+      return warn(
+          fmt::format("without a machine it is not known whether the loop of {} is closed with the "
+                      "{}, of which there is a position alone: it is taken to be; name the machine "
+                      "in the map",
+                      kAxisNames[axis], kind == Kind::load_position ? "load" : "motor"));
     const bool of_load = kind == Kind::load_position;
     if (of_load == (declared_->axes[axis].servo.feedback == ServoParams::Feedback::load)) return;
     throw MeasurementError(fmt::format(

@@ -41,6 +41,7 @@ constexpr double kMostForceLag = 0.2;   ///< [s] either way
 constexpr double kForceLag = 6e-3;      ///< [s] that lags of a current loop and filters make
 constexpr double kLateLeaves = 4;       // times less, at another time
 constexpr long kSamplesOfForce = 20'000;
+constexpr long kFinerLag = 30;  // steps of time in one of 3 ms
 constexpr double kFarAway = 3;  // times all that lies together
 
 struct Spread {
@@ -604,7 +605,8 @@ class Checker {
     };
     for (long late = -most; late <= most; late += coarse) look(late);
     const long about = best;
-    for (long late = about - coarse; late <= about + coarse; ++late)
+    const long fine = std::max(1L, coarse / kFinerLag);
+    for (long late = about - coarse; late <= about + coarse; late += fine)
       if (std::abs(late) <= most) look(late);
     for (const long late : {-known, 0L, known}) look(late);
     if (std::abs(best) <= known || std::abs(best) == most || least > 1 - kFits ||

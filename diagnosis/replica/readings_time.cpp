@@ -21,6 +21,7 @@ constexpr double kLeavesLess = 25;       // times, of chi-square
 constexpr double kExplains = 0.9;        ///< share, of what is certainly understood
 constexpr double kSpeedOver = 10e-3;     ///< [s] of a mean
 constexpr double kHalvesAgree = 2e-3;    ///< [s]
+constexpr long kFiner = 20;              // steps of time in one of 2 ms
 constexpr std::size_t kMostPoints = 40'000;
 constexpr std::size_t kFewestPoints = 100;
 
@@ -152,7 +153,8 @@ BestTime best_time(const TimeFit& fit, std::size_t begin, std::size_t end) {
   };
   for (long s = -most; s <= most; s += coarse) look(s);
   const long about = best.shift;
-  for (long s = about - coarse + 1; s < about + coarse; ++s)
+  const long fine = std::max(1L, coarse / kFiner);
+  for (long s = about - coarse; s <= about + coarse; s += fine)
     if (std::abs(s) <= most) look(s);
   for (const long s : {-known, known}) look(s);
   return best;

@@ -180,6 +180,8 @@ TEST(ImportTable, ThePositionOfTwoIsThatOfTheDeclaredLoop) {
   const std::string motor =
       kTime + signal("cmd", "command", "X", "m") + signal("motor", "motor_position", "X", "m");
   EXPECT_NO_THROW(import_table(table, parse_import_map(motor, "map.toml"), "map.toml", &machine));
+  EXPECT_TRUE(warned(import_table(table, parse_import_map(motor, "map.toml"), "map.toml", nullptr),
+                     "whether the loop of X is closed with the motor"));
   const std::string refused = refusal(motor, table);  // the loop of declared() has a scale
   EXPECT_NE(refused.find("axes.X.feedback"), std::string::npos) << refused;
 }
