@@ -250,6 +250,33 @@ TEST_F(DiagnoseCli, CompensationSaysWhereItDoesHarm) {
   EXPECT_EQ(good.find("warning:"), std::string::npos) << good;
 }
 
+TEST_F(DiagnoseCli, WhatWasImportedWithoutAMachineIsCheckedWithTheModel) {
+  std::string table = "t,cmd,pos,F\n";
+  for (int k = 0; k < 4000; ++k) {
+    const auto at = [&](double t) { return 100e-3 * std::sin(kPi2 * t / 2); };
+    const double t = 1e-3 * k, a = -100e-3 * kPi2 * kPi2 / 4 * std::sin(kPi2 * t / 2);
+    table += fmt::format("{},{},{},{}\n", t, at(t), at(t - 4e-3), 500 * a);
+  }
+  write_text(scratch_ / "far.csv", table);
+  std::string map = "[time]\ncolumn = \"t\"\nunit = \"s\"\n";
+  for (const char* kind : {"cmd\"\nkind = \"command", "pos\"\nkind = \"position"})
+    map += fmt::format("[[signals]]\ncolumn = \"{}\"\naxis = \"X\"\nunit = \"m\"\nscale = 1000\n",
+                       kind);
+  write_text(scratch_ / "far.toml", map);
+  const std::string record = scratch_ / "far.h5";
+  const Said imported = vcnc("import " + (scratch_ / "far.csv") + " --map " +
+                             (scratch_ / "far.toml") + " --out " + record);
+  ASSERT_EQ(imported.code, 0) << imported.err;
+  EXPECT_NE(imported.out.find("The map names no machine: travels, speeds, forces and inertias are "
+                              "not checked until vcnc diagnose has the model."),
+            std::string::npos)
+      << imported.out;
+  const std::string model = scratch_ / "machine.toml", travel = "the declared travel is";
+  expect_refused("diagnose " + record + " --model " + model, travel);
+  expect_refused("commission " + record + " --model " + model + " --out " + (scratch_ / "new.toml"),
+                 travel);
+}
+
 TEST_F(DiagnoseCli, TheMapHasItsReference) {
   const Said said = vcnc("import --keys");
   EXPECT_EQ(said.code, 0);
