@@ -22,7 +22,7 @@ constexpr double kExplains = 0.9;        ///< share, of what is certainly unders
 constexpr double kSpeedOver = 10e-3;     ///< [s] of a mean
 constexpr double kHalvesAgree = 2e-3;    ///< [s]
 constexpr long kFiner = 20;              // steps of time in one of 2 ms
-constexpr std::size_t kMostPoints = 40'000;
+constexpr std::size_t kMostPoints = 5000;
 constexpr std::size_t kFewestPoints = 100;
 
 using Values = std::vector<double>;
