@@ -136,6 +136,12 @@ void rest(FittedMachine& m) {
   m.columns.clear();
 }
 
+/// Whether a fit has left numbers where it began: what was gained is not theirs.
+bool nothing_moved(const std::vector<FreedNumber>& begun, const std::vector<FreedNumber>& now) {
+  return std::equal(begun.begin(), begun.end(), now.begin(), now.end(),
+                    [](const FreedNumber& a, const FreedNumber& b) { return a.value == b.value; });
+}
+
 std::string told(const Candidate& c) {
   if (c.effect == "position_lag_us") return "lag of the position loop";
   if (c.effect == "velocity_lag_us") return "lag of the measured velocity";
@@ -249,8 +255,10 @@ class Commissioner {
     evidence_.each_together(trials.size(), [&](std::size_t i) {
       const std::vector<std::size_t> law = the(kFrictionLaws[i].effects, place);
       if (law.empty()) return;
-      trials[i] = with_candidates(candidates_, machine_, law);
+      const FittedMachine begun = with_candidates(candidates_, machine_, law);
+      trials[i] = begun;
       converge(evidence_, trials[i]);
+      if (nothing_moved(begun.numbers(), trials[i].numbers())) trials[i] = machine_;
     });
     const FittedMachine* best = &machine_;
     for (const FittedMachine& trial : trials)
