@@ -71,7 +71,7 @@ std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vect
   return to;
 }
 
-constexpr double kDamping = 1e-3;     ///< of steps along columns (refit.hpp)
+constexpr double kDamping = 1e-3;     ///< of steps that fail undamped (refit.hpp)
 constexpr double kNoStep = 1;         ///< chi-square that no step is worth
 constexpr double kMuch = 10;          ///< and that a part of the step is worth to be sought for
 constexpr double kBetter = 0.1;       ///< of what a step promises, that it may do better by
@@ -299,9 +299,15 @@ void converge(const Evidence& evidence, FittedMachine& m) {
     const std::vector<FreedNumber> live = m.numbers();
     const std::vector<double> weight = weights(evidence, residual);
     const double least = misfit(evidence, residual, weight, m.nuisances.numbers);
-    const Refit f = refit(evidence, m.machine, live, without(m.nuisances, live),
-                          {.max_iterations = 8, .weight = weight, .damping = kDamping});
-    if (!step_towards(evidence, m, f, weight, least)) {
+    double promised = 0;
+    const auto step = [&](double damping) {
+      const Refit f = refit(evidence, m.machine, live, without(m.nuisances, live),
+                            {.max_iterations = 8, .weight = weight, .damping = damping});
+      promised = least - f.fitted;
+      return step_towards(evidence, m, f, weight, least);
+    };
+    // What undamped steps promise and do not keep, damped ones may.
+    if (!step(0) && (promised < kMuch || !step(kDamping))) {
       if (round == 0) stay(evidence, m);
       break;
     }
