@@ -61,7 +61,7 @@ void append_figures(std::vector<SignalFigure>& figures, const Record& record,
   const auto replica = replica_of(of, declared);
   if (healthy) replica->apply(less.unknown);
   const std::vector<SignalFigure> more =
-      figures_of(of, *replica, declared, found, name, less.noise_scale);
+      figures_of(of, *replica, declared, found, name, less.noise_scales(replica->channels()));
   figures.insert(figures.end(), more.begin(), more.end());
 }
 

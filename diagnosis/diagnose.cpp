@@ -44,8 +44,7 @@ std::vector<double> forms_of(const Evidence& evidence, const DifferentialRecord&
   const std::vector<ComparedChannel>& channels = evidence.replica().channels();
   std::vector<double> forms(channels.size(), 0.0);
   for (std::size_t c = 0; c < channels.size(); ++c) {
-    const double changed = kChangeOfForm * difference.off_in(channels[c]) /
-                           (difference.noise_scale * evidence.noise().channels[c].rms);
+    const double changed = kChangeOfForm * difference.off_in(channels[c]) / evidence.noise_left(c);
     forms[c] = evidence.count(c, Role::held_out) * changed * changed;
   }
   return forms;
@@ -125,7 +124,10 @@ struct Attempt {
   Attempt(const Question& question, FoundBeforehand known, const DiagnosisOptions& asked,
           const KeepGoing& keep_going, const Machine* encoders)
       : evidence(question.of.record, question.of.replica, question.declared,
-                 question.difference ? question.difference->noise_scale : 1, question.left),
+                 question.difference
+                     ? question.difference->noise_scales(question.of.replica.channels())
+                     : std::vector<double>{},
+                 question.left),
         before(std::move(known)) {
     const auto& [of, difference, declared, left] = question;
     if (encoders && evidence.noise().from_repetitions) evidence.reckon_with_rounding(*encoders);
@@ -220,8 +222,8 @@ Diagnosis diagnose(const DiagnosisCase& of, const DifferentialRecord& difference
 
 std::vector<SignalFigure> figures_of(const Record& record, Replica& replica,
                                      const Machine& declared, const Machine& found,
-                                     const std::string& name, double noise_scale) {
-  Evidence evidence(record, replica, declared, noise_scale);
+                                     const std::string& name, std::vector<double> noise_scale) {
+  Evidence evidence(record, replica, declared, std::move(noise_scale));
   const Prediction before = evidence.predict(declared), after = evidence.predict(found);
   std::vector<SignalFigure> all;
   for (std::size_t c = 0; c < replica.channels().size(); ++c)

@@ -29,6 +29,6 @@ Diagnosis diagnose(const DiagnosisCase& of, const DifferentialRecord& difference
 /// that of a difference from a healthy run.
 std::vector<SignalFigure> figures_of(const Record& record, Replica& replica,
                                      const Machine& declared, const Machine& found,
-                                     const std::string& name, double noise_scale = 1);
+                                     const std::string& name, std::vector<double> noise_scale = {});
 
 }  // namespace vcnc

@@ -571,7 +571,12 @@ class Report {
   std::vector<std::string> what_is_still_off() const {
     std::vector<std::string> off;
     const Prediction found = evidence_.predict(d_.found);
-    const std::vector<double> before = evidence_.rms_within_laps(evidence_.predict(of_.declared),
+    // Where the piece lies is no fault that a model of it could be wrong about.
+    Machine clamped = of_.declared;
+    for (const FreedNumber& n : this->found().nuisances.numbers)
+      if (n.number.key.starts_with("effects.setup."))
+        move_number(clamped, n.number.key, number_of(d_.found, n.number.key));
+    const std::vector<double> before = evidence_.rms_within_laps(evidence_.predict(clamped),
                                                                  Role::held_out),
                               after = evidence_.rms_within_laps(found, Role::held_out),
                               fitted = evidence_.rms_within_laps(found, Role::fitted);

@@ -20,6 +20,7 @@ using namespace figure_style;
 constexpr int kBins = 30;
 /// Lower edge of a plot 300 high: with less room gnuplot leaves out what its axis is.
 constexpr double kUnder = 0.21;
+constexpr double kBesideJump_s = 2;  // shown on both sides of a law that jumps
 /// In the unit shown: less is nothing, and its numbers would have no room.
 constexpr double kNothingToSee = 1e-3;
 
@@ -203,10 +204,13 @@ std::string law_figure(const LearnedLaw& learned) {
   const Shown y = shown_value(law);
   std::string text = heading(900, 300) + margins(kUnder, 0.88) +
                      "set key at graph 1,graph 1.17 noopaque\n$law << EOD\n";
-  for (std::size_t i = 0; i < law.at.size(); ++i)
-    text +=
-        fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}\n", law.at[i] * x.factor, law.value[i] * y.factor,
-                    learned.low[i] * y.factor, learned.high[i] * y.factor);
+  const auto point = [&](double at, std::size_t i) {
+    text += fmt::format("{:.9g} {:.6g} {:.6g} {:.6g}\n", at * x.factor, law.value[i] * y.factor,
+                        learned.low[i] * y.factor, learned.high[i] * y.factor);
+  };
+  if (law.jumps()) point(law.at.front() - kBesideJump_s, 0);
+  for (std::size_t i = 0; i < law.at.size(); ++i) point(law.at[i], i);
+  if (law.jumps()) point(law.at.back() + kBesideJump_s, law.at.size() - 1);
   const std::string of =
       law.over == Covariate::time
           ? std::string()

@@ -18,6 +18,8 @@
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/fitted_machine.hpp"
 #include "diagnosis/search/freed_number.hpp"
+#include "diagnosis/search/noise_audit.hpp"
+#include "diagnosis/search/partition.hpp"
 
 namespace vcnc {
 namespace {
@@ -30,6 +32,8 @@ constexpr double kOtherWay = 0.1, kNoWay = 1e-3;
 /// A reading is not told where it is off by more than this, of its roughness, and by more than
 /// this, of what it usually is: a model that is wrong by a little everywhere cancels.
 constexpr double kUntold = 20, kFarOff = 5;
+/// Each lap is held against one of the healthy run where that leaves less than this of the scatter.
+constexpr double kClearlyLess = 0.5;
 /// Part of the readings that may be left out without a word.
 constexpr double kLeftOut = 0.2;
 
@@ -180,6 +184,18 @@ std::vector<const Stretch*> partners(const Record& now, const Stretch& lap, cons
   return laps;
 }
 
+/// The sample of a healthy lap that is the sample k of another.
+std::size_t sample_of(const Stretch& healthy, const Stretch& lap, std::size_t k) {
+  return std::min(healthy.begin + (k - lap.begin), healthy.end - 1);
+}
+
+/// The one of them that came as late as a lap of another run, else the first.
+const Stretch& as_late_as(const Stretch& lap, const std::vector<const Stretch*>& laps) {
+  const auto found = std::find_if(
+      laps.begin(), laps.end(), [&](const Stretch* h) { return h->repetition == lap.repetition; });
+  return found == laps.end() ? *laps.front() : **found;
+}
+
 /// What was in the laps of a healthy run, in those of another run that do the same.
 std::vector<double> in_laps_of(const Record& now, const HealthyRun& healthy,
                                const std::vector<double>& series) {
@@ -187,8 +203,9 @@ std::vector<double> in_laps_of(const Record& now, const HealthyRun& healthy,
   std::vector<double> result(now.samples(), kMissing);
   for (const Stretch& lap : now.stretches) {
     const std::vector<const Stretch*> laps = partners(now, lap, healthy.record);
-    for (std::size_t k = lap.begin; !laps.empty() && k < lap.end; ++k)
-      result[k] = series[std::min(laps[0]->begin + (k - lap.begin), laps[0]->end - 1)];
+    if (laps.empty()) continue;
+    const Stretch& same = as_late_as(lap, laps);
+    for (std::size_t k = lap.begin; k < lap.end; ++k) result[k] = series[sample_of(same, lap, k)];
   }
   hold_over_gaps(result);
   return result;
@@ -200,6 +217,78 @@ bool unlike(const std::vector<LapEvent>& events, const MeasuredSignal& signal, s
     return e.begin <= sample && sample < e.end &&
            (signal.kind == SignalKind::deflection || signal.axis == e.axis);
   });
+}
+
+/// A lap and those of the healthy run that do the same.
+struct Pairing {
+  const Stretch* lap;
+  std::vector<const Stretch*> healthy;
+};
+using Pairings = std::vector<Pairing>;
+
+/// Of those, the ones that came as late as the lap.
+Pairings only_as_late(Pairings all) {
+  for (auto& [lap, healthy] : all) {
+    const int late = lap->repetition;
+    std::erase_if(healthy, [late](const Stretch* h) { return h->repetition != late; });
+  }
+  return all;
+}
+
+/// A signal less what the healthy run has besides its machine.
+struct Difference {
+  std::vector<double> value;
+  double noise_scale = 1;
+};
+
+/// `off`: what the healthy run is off its machine; the mean over the healthy laps counts.
+Difference less_laps(const std::vector<double>& signal, const std::vector<double>& off,
+                     const Pairings& pairings) {
+  Difference d{std::vector<double>(signal.size(), kMissing)};
+  std::size_t fewest = 0;
+  for (const auto& [lap, laps] : pairings) {
+    if (laps.empty()) continue;
+    fewest = fewest == 0 ? laps.size() : std::min(fewest, laps.size());
+    for (std::size_t k = lap->begin; k < lap->end; ++k) {
+      double sum = 0;
+      for (const Stretch* h : laps) sum += off[sample_of(*h, *lap, k)];
+      d.value[k] = signal[k] - sum / static_cast<double>(laps.size());
+    }
+  }
+  if (fewest > 0) d.noise_scale = std::sqrt(1 + 1 / static_cast<double>(fewest));
+  return d;
+}
+
+/// Less what the healthy laps are off on average, or, where that leaves clearly less that changes
+/// from lap to lap, less what the lap is off that came as late: what both runs have in their first
+/// lap and not in their second is no noise.
+Difference difference_of(const Record& now, const MeasuredSignal& signal, const HealthyRun& healthy,
+                         const Pairings& pairings) {
+  const auto channel = std::find(healthy.channels.begin(), healthy.channels.end(),
+                                 ComparedChannel{signal.kind, signal.axis});
+  const MeasuredSignal* partner = healthy.record.find(signal.kind, signal.axis);
+  if (channel == healthy.channels.end() || !partner)
+    return {std::vector<double>(signal.value.size(), kMissing)};
+  const std::vector<double>& yhat =
+      healthy.predicted[static_cast<std::size_t>(channel - healthy.channels.begin())];
+  std::vector<double> off(yhat.size());
+  for (std::size_t k = 0; k < off.size(); ++k)
+    off[k] = unlike(healthy.events, signal, k) ? kMissing : partner->value[k] - yhat[k];
+  const Pairings as_late = only_as_late(pairings);
+  Difference mean = less_laps(signal.value, off, pairings);
+  if (std::any_of(as_late.begin(), as_late.end(),
+                  [](const Pairing& p) { return p.healthy.empty(); }))
+    return mean;
+  Difference each = less_laps(signal.value, off, as_late);
+  each.noise_scale = 1;  // the noise of both runs is in what its laps differ by
+  const auto scatter = [&](const Difference& d) {
+    std::vector<double> left(d.value.size(), kMissing);
+    for (const auto& [lap, laps] : as_late)
+      for (std::size_t k = lap->begin; k < lap->end; ++k)
+        left[k] = d.value[k] - yhat[sample_of(*laps.front(), *lap, k)];
+    return lap_scatter(partition(now), left).value_or(0) * d.noise_scale;
+  };
+  return scatter(each) < kClearlyLess * scatter(mean) ? each : mean;
 }
 
 /// Laps under other forces are no repetitions of the same.
@@ -251,6 +340,16 @@ double DifferentialRecord::off_in(const ComparedChannel& channel) const {
   return 0;
 }
 
+std::vector<double> DifferentialRecord::noise_scales(
+    const std::vector<ComparedChannel>& channels) const {
+  if (noise_scale.empty()) return {};
+  std::vector<double> all(channels.size(), 1);
+  for (std::size_t c = 0; c < all.size(); ++c)
+    for (const auto& [of, scale] : noise_scale)
+      if (of == channels[c]) all[c] = scale;
+  return all;
+}
+
 DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
   check_known_forces(now, healthy.record);
   for (const Record* of : {&now, &healthy.record})
@@ -260,8 +359,12 @@ DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
                              "compared with a healthy run; give them in the map ([[laps]] or "
                              "lap_column)");
   check_same_kinematics(now, healthy.record);
-  if (std::all_of(now.stretches.begin(), now.stretches.end(),
-                  [&](const Stretch& s) { return partners(now, s, healthy.record).empty(); }))
+  Pairings pairings;
+  for (const Stretch& lap : now.stretches)
+    pairings.push_back({&lap, partners(now, lap, healthy.record)});
+  const std::size_t unmatched = static_cast<std::size_t>(
+      std::erase_if(pairings, [](const Pairing& p) { return p.healthy.empty(); }));
+  if (pairings.empty())
     throw MeasurementError(healthy.record.source + ": does none of the motions of " + now.source +
                            "; a healthy run needs the same program");
   if (std::none_of(now.signals.begin(), now.signals.end(), [&](const MeasuredSignal& s) {
@@ -272,33 +375,13 @@ DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
         "columns",
         healthy.record.source, measured_by(healthy.record), now.source, measured_by(now)));
   DifferentialRecord result{.record = now, .noise = healthy.noise, .healthy = healthy.machine};
-  std::size_t fewest = 0, unmatched = 0;
   for (MeasuredSignal& signal : result.record.signals) {
     if (!is_compared(signal.kind)) continue;
     if (signal.kind == SignalKind::position && is_followed(now, signal.axis)) continue;
-    const auto channel = std::find(healthy.channels.begin(), healthy.channels.end(),
-                                   ComparedChannel{signal.kind, signal.axis});
-    const MeasuredSignal* partner = healthy.record.find(signal.kind, signal.axis);
-    std::vector<double> left(signal.value.size(), kMissing);
-    if (channel != healthy.channels.end() && partner) {
-      const std::vector<double>& yhat =
-          healthy.predicted[static_cast<std::size_t>(channel - healthy.channels.begin())];
-      for (const Stretch& s : now.stretches) {
-        const std::vector<const Stretch*> laps = partners(now, s, healthy.record);
-        unmatched += laps.empty();
-        if (laps.empty()) continue;
-        fewest = fewest == 0 ? laps.size() : std::min(fewest, laps.size());
-        for (std::size_t k = s.begin; k < s.end; ++k) {
-          double sum = 0;
-          for (const Stretch* h : laps) {
-            const std::size_t at = std::min(h->begin + (k - s.begin), h->end - 1);
-            sum += unlike(healthy.events, signal, at) ? kMissing : partner->value[at] - yhat[at];
-          }
-          left[k] = signal.value[k] - sum / static_cast<double>(laps.size());
-        }
-      }
-    }
-    signal.value = std::move(left);
+    Difference difference = difference_of(now, signal, healthy, pairings);
+    signal.value = std::move(difference.value);
+    result.noise_scale.emplace_back(ComparedChannel{signal.kind, signal.axis},
+                                    difference.noise_scale);
   }
   if (unmatched > 0)
     result.record.warnings.push_back(
@@ -308,7 +391,6 @@ DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
     result.unknown[axis] = in_laps_of(now, healthy, healthy.unknown[axis]);
   result.off = leave_out_untold(result.record, now);
   add_left_of_forces(now, result, healthy);
-  if (fewest > 0) result.noise_scale = std::sqrt(1 + 1 / static_cast<double>(fewest));
   return result;
 }
 

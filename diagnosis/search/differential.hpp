@@ -1,6 +1,6 @@
 // A record less what a healthy run of the same program has besides its declared machine.
 //
-//   y := y_now - mean over laps of (y_ref - yhat_ref(healthy))
+//   y := y_now - mean over laps of (y_ref - yhat_ref(healthy)), or of the lap that came as late
 //
 // so that what the model gets wrong about the healthy machine cancels to first order. `healthy` is
 // the declared machine with the piece where it was clamped for the healthy run, which is fitted
@@ -8,7 +8,10 @@
 // condition; samples without a partner become missing, and so do readings of the probe where the
 // healthy machine is off the healthy run by 20 times their roughness, as in the moment of touching
 // or while the drag on the ball turns over: there the model does not tell what a change does
-// either. The noise of the reference stays in: variances grow by 1 + 1/n for n laps.
+// either. The noise of the reference stays in: variances grow by 1 + 1/n for n laps. Where laps
+// differ in the same way in both runs (a lap that begins between samples, grease that is spread),
+// each is held against the healthy one that came as late: their noise is then in what laps differ
+// by.
 //
 // With its forces, the healthy run first tells the lags of its loops (controller_lags.hpp), then a
 // force that no model of its friction has (unknown_force.hpp).
@@ -30,7 +33,7 @@ namespace vcnc {
 
 struct DifferentialRecord {
   Record record;
-  double noise_scale = 1;  ///< of the standard deviation
+  std::vector<std::pair<ComparedChannel, double>> noise_scale{};  ///< of standard deviations
   /// RMS of what a signal is off yhat in the healthy run, of what may be otherwise another day:
   /// readings of the probe, and where a force is unknown what is left of it in the drive's signals.
   std::vector<std::pair<ComparedChannel, double>> off{};
@@ -39,6 +42,8 @@ struct DifferentialRecord {
   Machine healthy;        ///< what the record is held against instead of the declared machine
 
   double off_in(const ComparedChannel& channel) const;  ///< 0: nothing is known
+  /// Of every channel, as Evidence takes them; empty for no difference.
+  std::vector<double> noise_scales(const std::vector<ComparedChannel>& channels) const;
 };
 
 /// A healthy run and the declared machine with the piece where it was clamped for that.

@@ -96,13 +96,13 @@ Column less(const Column& z, const std::vector<Column>& columns, const Eigen::Ve
 }
 
 Evidence::Evidence(const Record& record, Replica& replica, const Machine& declared,
-                   double noise_scale, const std::vector<double>& form)
+                   std::vector<double> noise_scale, const std::vector<double>& form)
     : record_(record),
       replica_(replica),
       gathering_(replica),
       partition_(vcnc::partition(record)),
       declared_(replica.predict(declared)),
-      noise_scale_(noise_scale),
+      noise_scale_(std::move(noise_scale)),
       form_(form) {
   for (const ComparedChannel& channel : replica.channels()) {
     const MeasuredSignal* signal = record.find(channel.kind, channel.axis);
@@ -140,8 +140,8 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
   for (std::size_t c = 0; c < noise_.channels.size(); ++c) {
     ChannelNoise& channel = noise_.channels[c];
     const double louder = c < form_.size() ? std::hypot(1, form_[c] / channel.rms) : 1;
-    channel.filter.scale *= noise_scale_ * louder;
-    channel.once.scale *= noise_scale_ * louder;
+    channel.filter.scale *= noise_scale(c) * louder;
+    channel.once.scale *= noise_scale(c) * louder;
     channel.of_laps /= louder * louder;
   }
   count_valid();
@@ -181,7 +181,7 @@ bool Evidence::is_within_steps(const Prediction& prediction, std::size_t channel
   const double step = step_of(channel), noise = noise_.channels[channel].rms;
   if (share_of_steps(channel) < kMostlySteps) return false;
   const double other = std::sqrt(std::max(0.0, noise * noise - step * step / 12)),
-               rounded = (noise_scale_ > 1 ? 2 : 1) * kHalfAStep * step,  // a difference: twice
+               rounded = (noise_scale_.empty() ? 1 : 2) * kHalfAStep * step,  // a difference: twice
       most = rounded + 3 * other;
   double beyond = 0;
   for (std::size_t k = 0; k < measured_[channel].size(); ++k) {

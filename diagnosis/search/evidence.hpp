@@ -71,8 +71,8 @@ class Evidence {
   /// tell the noise; `noise_scale` is what its standard deviation grows by beyond what laps tell,
   /// `form` the RMS per channel that the model is known to leave [SI] and that counts as noise,
   /// too. The references must outlive this.
-  Evidence(const Record& record, Replica& replica, const Machine& declared, double noise_scale = 1,
-           const std::vector<double>& form = {});
+  Evidence(const Record& record, Replica& replica, const Machine& declared,
+           std::vector<double> noise_scale = {}, const std::vector<double>& form = {});
 
   const Record& record() const { return record_; }
   const Replica& replica() const { return replica_; }
@@ -80,7 +80,7 @@ class Evidence {
   const NoiseAudit& noise() const { return noise_; }
   /// RMS of the noise of a sample with that of the healthy run that was taken off [SI].
   double noise_left(std::size_t channel) const {
-    return noise_scale_ * noise_.channels[channel].rms;
+    return noise_scale(channel) * noise_.channels[channel].rms;
   }
   /// The same with what the model is known to leave and what its encoder rounds off.
   double reckoned_with(std::size_t channel) const {
@@ -159,6 +159,9 @@ class Evidence {
   RoleGrams cross(const std::vector<const Column*>& a, const std::vector<const Column*>& b) const;
 
  private:
+  double noise_scale(std::size_t channel) const {
+    return channel < noise_scale_.size() ? noise_scale_[channel] : 1;
+  }
   bool takes(const RecordBlock& block, Role role) const {
     return role == Role::both || block.held_out == (role == Role::held_out);
   }
@@ -200,7 +203,8 @@ class Evidence {
   SeriesOfChannels difference_;              ///< from the declared machine, without drifts
   std::vector<SeriesOfChannels> per_shift_;  ///< of the piece; empty without a probe
   std::vector<SeriesOfChannels> of_forces_;  ///< Replica::of_unknown_forces()
-  double noise_scale_;
+  /// Of standard deviations, per channel; empty: 1.
+  std::vector<double> noise_scale_;
   std::vector<double> form_;
   Coloured coloured_ = Coloured::deviation;
   NoiseAudit noise_;

@@ -23,7 +23,8 @@ constexpr double kNudge = 0.02, kWorthARound = 0.99;
 constexpr double kWrongAboutOne = 0.05;
 /// Part of what the least of many names does that a law need not do.
 constexpr double kOfTheLeast = 0.1;
-constexpr double kPulse = 2e-3;  // half width of the pulse [s]
+constexpr double kPulse = 2e-3;        // half width of the pulse [s]
+constexpr std::size_t kInstants = 64;  // at which a jump is sought first
 
 using Series = std::vector<double>;
 
@@ -107,6 +108,38 @@ class Laws {
     return laws;
   }
 
+  /// Jumps in time, each where `gain` of it is largest: of the displacement of axes and of
+  /// readings.
+  template <class GainOf>
+  std::vector<Law> jumps(const GainOf& gain) const {
+    std::vector<Law> all;
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      if (moves_[i]) all.push_back(jump(i, Law::Point::displacement, 1));
+      if (is_read(i)) all.push_back(jump(i, Law::Point::reading, 1));
+    }
+    parallel_for(all.size(), [&](std::size_t i) {
+      const auto at = [&](std::size_t sample) {
+        return jump(all[i].axis_index(), all[i].point, sample);
+      };
+      const std::size_t samples = evidence_.record().samples();
+      std::size_t step = samples / kInstants, best = 0;
+      double most = 0;
+      const auto take_if_better = [&](std::size_t sample) {
+        if (sample < 1 || sample + 1 >= samples) return;
+        if (const double g = gain(at(sample)); g > most) most = g, best = sample;
+      };
+      for (std::size_t k = 1; k < kInstants; ++k) take_if_better(k * step);
+      while (best > 0 && step > 1) {
+        step = (step + 1) / 2;
+        const std::size_t middle = best;
+        take_if_better(middle - std::min(step, middle));
+        take_if_better(middle + step);
+      }
+      all[i] = at(std::max<std::size_t>(1, best));
+    });
+    return all;
+  }
+
   /// Whether the record has this component of the probe's reading.
   bool is_read(std::size_t component) const {
     const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
@@ -166,6 +199,16 @@ class Laws {
     for (std::size_t h = 0; h < kHats; ++h)
       at.push_back(low + (high - low) * static_cast<double>(h) / (kHats - 1));
     return at;
+  }
+
+  /// A law without values that changes from one sample to this one.
+  Law jump(std::size_t axis, Law::Point point, std::size_t sample) const {
+    Law law;
+    law.axis = law.over_axis = law.times_axis = static_cast<Law::OfAxis>(axis);
+    law.point = point;
+    const double time = evidence_.record().begin + static_cast<double>(sample) * period_;
+    law.at = {time - period_, time};
+    return law;
   }
 
   Law pulse(std::size_t axis, double at, double size) const {
@@ -410,6 +453,9 @@ std::string words_of(const Law& law) {
     factor = fmt::format("sgn(v_{}) ", kAxisNames[static_cast<std::size_t>(law.times_axis)]);
   else if (law.times != Covariate::time)
     factor = named(law.times, law.times_axis) + " ";
+  if (law.jumps())
+    return fmt::format("{} on {} that jumps at {:.2f} s", points[static_cast<int>(law.point)],
+                       kAxisNames[law.axis_index()], law.at.back());
   return fmt::format("{} on {} as {}f({})", points[static_cast<int>(law.point)],
                      kAxisNames[law.axis_index()], factor, named(law.over, law.over_axis));
 }
@@ -419,10 +465,12 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
   const Laws laws(evidence, at);
   const LinearPart linear = at.linear();
   const Ground ground(evidence, at.residual, linear);
-  const std::vector<Law> all = laws.all();
+  const auto fitted = [&](const Law& law) { return fit(evidence, ground, laws.columns(law)); };
+  std::vector<Law> all = laws.all();
+  for (Law& jump : laws.jumps([&](const Law& law) { return fitted(law).gain; }))
+    all.push_back(std::move(jump));
   std::vector<LinearLaw> fits(all.size());
-  parallel_for(all.size(),
-               [&](std::size_t i) { fits[i] = fit(evidence, ground, laws.columns(all[i])); });
+  parallel_for(all.size(), [&](std::size_t i) { fits[i] = fitted(all[i]); });
 
   LawFit best;
   best.machine = at.machine;

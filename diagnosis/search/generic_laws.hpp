@@ -1,6 +1,7 @@
 // Laws without a name: what is left over as a function of something, through the closed loop.
 //
 //   y = m f(c),   f = sum of 10 hat functions over the range of the covariate c, with a small ridge
+//   y = a before an instant, b after it: what slips, once
 //
 // at a point of an axis (model/effects/law.hpp): force on the table, displacement of the tool
 // centre, reading of the probe. m is 1, a sign of the velocity or a position. To first order the

@@ -34,6 +34,11 @@ double Law::operator()(double t, const Motions<double>& axes) const {
   return factor * function(read(over, over_axis));
 }
 
+bool Law::jumps() const {
+  return over == Covariate::time && times == Covariate::time && at.size() == 2 &&
+         at[1] - at[0] < 10e-3;
+}
+
 std::string Law::objection() const {
   if (at.empty()) return "needs at least one knot and its value";
   if (at.size() != value.size())

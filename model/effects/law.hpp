@@ -86,6 +86,8 @@ struct Law {
   double function(double c) const;
   /// y for the motions of all axes at time t [s].
   double operator()(double t, const Motions<double>& axes) const;
+  /// From one value to another within 10 ms, once.
+  bool jumps() const;
   /// Empty, or what is wrong with it in one sentence.
   std::string objection() const;
 

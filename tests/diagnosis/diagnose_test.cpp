@@ -313,6 +313,23 @@ TEST(Diagnose, FitsALawWhereItActs) {
   EXPECT_NEAR(*high, 6e-6, 1.5e-6);
 }
 
+/// What slips once is a law that jumps, not the slow wave or the drift that is most like it.
+TEST(Diagnose, TellsWhenSomethingSlipped) {
+  Record record = measured({}, 47);
+  const std::size_t at = record.samples() / 2 + 77;
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::deflection)
+      for (std::size_t k = at; k < s.value.size(); ++k) s.value[k] += 3e-6;
+  const Diagnosis d = diagnosed(record);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::unexplained);
+  ASSERT_TRUE(d.law);
+  const Law& law = d.law->law;
+  ASSERT_TRUE(law.jumps()) << d.law->words;
+  EXPECT_NEAR(law.at.back(), static_cast<double>(at) * record.period, 2 * record.period);
+  EXPECT_NEAR(law.value.back() - law.value.front(), 3e-6, 0.05e-6);
+  EXPECT_NE(d.law->words.find("jumps at"), std::string::npos) << d.law->words;
+}
+
 /// The moving mass is declared as 500 kg with a tolerance of 1 %.
 TEST(Diagnose, TellsADeclaredNumberOutOfToleranceWithItsGain) {
   const Machine truth = toy::machine({{"axes.X.load_kg", 560}});

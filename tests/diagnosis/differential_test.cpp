@@ -1,0 +1,104 @@
+#include "diagnosis/search/differential.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "toy_machine.hpp"
+
+namespace vcnc {
+namespace {
+
+constexpr std::size_t kLap = 400;
+constexpr int kLaps = 4;
+constexpr std::size_t kPosition = 0;  // channel of the toy
+
+Record measured(std::uint64_t seed) {
+  Record record = toy::commands(kLap, kLaps);
+  toy::measure(record, {}, seed);
+  return record;
+}
+
+std::vector<double>& position_of(Record& record) {
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::position) return s.value;
+  throw std::logic_error("a toy has a position");
+}
+
+/// Adds to the position what changes its sign from lap to lap.
+void add_turning(Record& record, double size) {
+  std::vector<double>& position = position_of(record);
+  for (const Stretch& s : record.stretches)
+    for (std::size_t k = s.begin; k < s.end; ++k)
+      position[k] +=
+          (s.repetition % 2 == 0 ? size : -size) * std::sin(static_cast<double>(k - s.begin) / 20);
+}
+
+HealthyRun healthy(const Record& record) {
+  toy::ToyReplica replica(record);
+  return healthy_run(record, replica, {});
+}
+
+/// Root of the mean square of a difference from what the machine does as declared.
+double left_of(const DifferentialRecord& difference) {
+  const std::vector<double> clean = toy::ToyReplica(difference.record).predict({})[kPosition];
+  const std::vector<double>& is = difference.record.find(SignalKind::position, 0)->value;
+  double sum = 0;
+  for (std::size_t k = 0; k < is.size(); ++k) sum += std::pow(is[k] - clean[k], 2);
+  return std::sqrt(sum / static_cast<double>(is.size()));
+}
+
+double scale_of_position(const DifferentialRecord& difference) {
+  return difference.noise_scales({{SignalKind::position, 0}}).front();
+}
+
+TEST(LessHealthy, TakesTheMeanOfTheHealthyLapsOff) {
+  const DifferentialRecord d = less_healthy(measured(1), healthy(measured(2)));
+  EXPECT_NEAR(left_of(d), std::sqrt(1 + 1.0 / kLaps) * toy::kPositionNoise,
+              0.05 * toy::kPositionNoise);
+  EXPECT_DOUBLE_EQ(scale_of_position(d), std::sqrt(1 + 1.0 / kLaps));
+}
+
+TEST(LessHealthy, HoldsALapAgainstTheHealthyOneThatCameAsLateWhereLapsDifferAlike) {
+  Record now = measured(1), before = measured(2);
+  add_turning(now, 10 * toy::kPositionNoise);
+  add_turning(before, 10 * toy::kPositionNoise);
+  const DifferentialRecord d = less_healthy(now, healthy(before));
+  EXPECT_NEAR(left_of(d), std::sqrt(2.0) * toy::kPositionNoise, 0.05 * toy::kPositionNoise);
+  EXPECT_DOUBLE_EQ(scale_of_position(d), 1);  // both noises are in what laps differ by
+  EXPECT_GT(d.noise_scales({{SignalKind::force, 0}}).front(), 1);  // whose laps are alike
+}
+
+TEST(LessHealthy, TakesTheMeanOffWhereOnlyTheHealthyLapsDiffer) {
+  Record before = measured(2);
+  add_turning(before, 10 * toy::kPositionNoise);
+  const DifferentialRecord d = less_healthy(measured(1), healthy(before));
+  EXPECT_NEAR(left_of(d), std::sqrt(1 + 1.0 / kLaps) * toy::kPositionNoise,
+              0.05 * toy::kPositionNoise);
+}
+
+TEST(LessHealthy, TakesTheMeanOffWhereALapHasNoPartnerThatCameAsLate) {
+  Record now = measured(1), before = measured(2);
+  add_turning(now, 10 * toy::kPositionNoise);
+  add_turning(before, 10 * toy::kPositionNoise);
+  std::erase_if(before.stretches, [](const Stretch& s) { return s.repetition == kLaps - 1; });
+  const DifferentialRecord d = less_healthy(now, healthy(before));
+  EXPECT_GT(left_of(d), 5 * toy::kPositionNoise);
+  EXPECT_DOUBLE_EQ(scale_of_position(d), std::sqrt(1 + 1.0 / (kLaps - 1)));
+}
+
+TEST(LessHealthy, GivesEveryLapTheUnknownForceOfTheOneThatCameAsLate) {
+  const Record now = measured(1), before = measured(2);
+  HealthyRun run = healthy(before);
+  run.unknown[0].resize(before.samples());
+  for (const Stretch& s : before.stretches)
+    for (std::size_t k = s.begin; k < s.end; ++k) run.unknown[0][k] = s.repetition;
+  const DifferentialRecord d = less_healthy(now, run);
+  ASSERT_EQ(d.unknown[0].size(), now.samples());
+  for (const Stretch& s : now.stretches)
+    EXPECT_DOUBLE_EQ(d.unknown[0][(s.begin + s.end) / 2], s.repetition);
+}
+
+}  // namespace
+}  // namespace vcnc
