@@ -23,9 +23,9 @@ namespace vcnc {
 namespace {
 
 constexpr double kFixed = 1e12;  ///< precision of a number that stays
-/// What an effect of the probe or the geometry must explain of what is left: less than that is the
-/// form of the contact.
-constexpr double kShareOfMeasuring = 0.05;
+/// What a gain, an effect of the probe or of the geometry must explain of what is left: less than
+/// that is the form of friction or of the contact.
+constexpr double kShareOfLeft = 0.05;
 constexpr double kWellOff = 10;         // times the noise
 constexpr double kNothing = 1e-3;       // of a typical size
 constexpr double kNearlyAsGood = 0.95;  ///< of the most that one promises: as good
@@ -48,6 +48,7 @@ const std::vector<std::string> kGains{"kv_error",
                                       "acceleration_ff_error",
                                       "velocity_gain_error",
                                       "integral_time_error",
+                                      "command_delay",
                                       "position_lag_us",
                                       "velocity_lag_us"};
 
@@ -184,15 +185,14 @@ class Commissioner {
       if (!is_driven(of_.record, axis)) continue;
       if (!go("friction and gains of " + place, axis)) break;
       fit_friction(place);
-      fit_best_of(the(kGains, place), place, 0, [&] { return go("gains of " + place, axis); });
+      fit_best_of(the(kGains, place), place, [&] { return go("gains of " + place, axis); });
       rest(machine_);
     }
     fit_together();
     std::vector<std::size_t> measuring;
     for (const std::string place : {"probe", "geometry", "probe.damping_ratio"})
       for (const std::size_t c : the(kMeasuring, place)) measuring.push_back(c);
-    fit_best_of(measuring, "probe", kShareOfMeasuring,
-                [&] { return go("probe and geometry", kAxisCount); });
+    fit_best_of(measuring, "probe", [&] { return go("probe and geometry", kAxisCount); });
     rest(machine_);
     fit_together();
     tell();
@@ -305,7 +305,7 @@ class Commissioner {
   }
 
   /// One after the other, the one first that promises most.
-  void fit_best_of(std::vector<std::size_t> left, const std::string& place, double least_share,
+  void fit_best_of(std::vector<std::size_t> left, const std::string& place,
                    const std::function<bool()>& go_on) {
     while (!left.empty() && go_on()) {
       std::vector<double> promise(left.size());
@@ -316,7 +316,7 @@ class Commissioner {
       const auto best = left.begin() + simplest_of_best(left, promise);
       FittedMachine better = with_candidates(candidates_, machine_, {*best});
       converge(evidence_, better);
-      if (!gains_enough(machine_, better, least_share)) return;
+      if (!gains_enough(machine_, better, kShareOfLeft)) return;
       if (!is_as_declared(better) && !stands_for_force(better))
         accept(std::move(better), place, told(candidates_[*best]));
       left.erase(best);

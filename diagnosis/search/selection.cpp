@@ -162,7 +162,8 @@ class Search {
       FittedMachine trial =
           fitted_with(from, contenders[i],
                       i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
-      if (from.held_out - trial.held_out > contenders[i].needed && holds_up(trial)) {
+      if (from.held_out - trial.held_out > contenders[i].needed && !says_the_same(trial, now) &&
+          holds_up(trial)) {
         now = best_of_as_good(from, std::move(trial), contenders, i, contest);
         return true;
       }
@@ -170,6 +171,19 @@ class Search {
     }
     evidence_.anchor(now.machine);
     return false;
+  }
+
+  /// Whether the same was found in both: what was added to what `from` held back went again when
+  /// declared numbers were pulled once more.
+  static bool says_the_same(const FittedMachine& a, const FittedMachine& b) {
+    const auto found = [](const FittedMachine& m) {
+      std::set<std::size_t> added;
+      std::set<std::string> released;
+      for (const AddedEffect& e : m.added) added.insert(e.candidate);
+      for (const ReleasedNumber& r : m.released) released.insert(r.key);
+      return std::pair(added, released);
+    };
+    return found(a) == found(b);
   }
 
   /// Whether its effects are told by what else is known of them than what they explain together.
@@ -248,13 +262,22 @@ class Search {
       const bool of_one_kind = other->released.empty() == contenders[than].released.empty();
       const double clearly = std::max(more * options_.class_gain,
                                       of_one_kind ? kHalf * rules_.excess(trial.held_out) : 0);
-      if (counted(instead, contest) < counted(trial, contest) + clearly || !holds_up(instead))
+      if (counted_within(instead, contest) < counted_within(trial, contest) + clearly ||
+          !holds_up(instead))
         continue;
       trial = std::move(instead);
       numbers = other->numbers.size();
     }
     evidence_.anchor(trial.machine);
     return trial;
+  }
+
+  /// The same with all declared numbers within their tolerances: what pulls them further explains
+  /// less than it seems to, and what does not is not to give way to it.
+  double counted_within(const FittedMachine& m, const Contest& contest) {
+    const double counts = counted(within_tolerance(m), contest);
+    evidence_.anchor(m.machine);
+    return counts;
   }
 
   /// What counts of the gain of a machine that came out of a contest.
@@ -547,8 +570,10 @@ class Search {
                                                      : -options_.least_gain;
         FittedMachine instead = less;
         add(instead, *better, {});
-        if (counted(instead, contest) >= counted(m, contest) - allowed_loss && holds_up(instead)) {
+        if (counted_within(instead, contest) >= counted_within(m, contest) - allowed_loss &&
+            holds_up(instead)) {
           m = std::move(instead);  // the last of its kind, so that the next one is here
+          evidence_.anchor(m.machine);
           continue;
         }
         rivals.erase(better);
@@ -565,7 +590,7 @@ class Search {
   bool exchange_for_as_good(FittedMachine& m, std::size_t i, const FittedMachine& less,
                             const std::vector<Contender>& rivals, const Contest& contest,
                             double lost) {
-    const double band = contest.band_of(lost), present = counted(m, contest);
+    const double band = contest.band_of(lost), present = counted_within(m, contest);
     std::optional<FittedMachine> simplest;
     double least = contest.intricacy(m.added[i]);
     std::vector<std::size_t> alike = m.added[i].class_with;
@@ -578,7 +603,7 @@ class Search {
         instead = *known;
       else
         add(instead, r, {}, far_more_than(m));
-      const double less_counts = present - counted(instead, contest);
+      const double less_counts = present - counted_within(instead, contest);
       if (less_counts > band || instead.added.empty() || !holds_up(instead)) continue;
       alike.push_back(r.candidate);
       const double intricacy = contest.intricacy(instead.added.back()) + less_counts / band;

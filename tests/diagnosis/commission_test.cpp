@@ -58,6 +58,20 @@ TEST(Commission, RecoversALagOfTheVirtualMachine) {
                           [](const Deviation& d) { return d.key == "axes.X.velocity_lag_us"; }));
 }
 
+/// Declared without friction, and as if its drive had what it is told at once: without the delay of
+/// the command among them, three gains far off make up for it.
+TEST(Commission, RecoversADelayOfTheCommandAndMovesNoGain) {
+  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
+  Effects effects;
+  effects.axis[kX].get<Coulomb>().level = 180;
+  effects.axis[kX].get<CommandDelay>().delay = 0.6e-3;
+  const Commissioning c = commissioned_x(effects);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.command_delay.delay_ms"), 0.6, 0.01);
+  for (const std::string gain : {"kv_error", "velocity_ff_error", "acceleration_ff_error",
+                                 "velocity_gain_error", "integral_time_error"})
+    EXPECT_EQ(number_of(c.machine, "effects.X." + gain + ".deviation_percent"), 0) << gain;
+}
+
 /// Declared with another damping of the probe, without friction of the ball and without squareness.
 TEST(Commission, RecoversTheProbeAndTheGeometryOfTheVirtualMachine) {
   if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
