@@ -205,7 +205,7 @@ std::string law_figure(const LearnedLaw& learned) {
   std::string text = heading(900, 300) + margins(kUnder, 0.88) +
                      "set key at graph 1,graph 1.17 noopaque\n$law << EOD\n";
   const auto point = [&](double at, std::size_t i) {
-    text += fmt::format("{:.9g} {:.6g} {:.6g} {:.6g}\n", at * x.factor, law.value[i] * y.factor,
+    text += fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}\n", at * x.factor, law.value[i] * y.factor,
                         learned.low[i] * y.factor, learned.high[i] * y.factor);
   };
   if (law.jumps()) point(law.at.front() - kBesideJump_s, 0);

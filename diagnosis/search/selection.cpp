@@ -254,6 +254,7 @@ class Search {
     std::size_t numbers = contenders[than].numbers.size();
     const bool leaves = rules_.excess(trial.held_out) > options_.least_gain;
     also_fitted_ = {trial};
+    double present = counted_within(trial, contest);
     for (const Contender* other : as_good(contenders, than, leaves)) {
       FittedMachine instead =
           also_fitted_.emplace_back(fitted_with(now, *other, {}, far_more_than(trial)));
@@ -262,9 +263,9 @@ class Search {
       const bool of_one_kind = other->released.empty() == contenders[than].released.empty();
       const double clearly = std::max(more * options_.class_gain,
                                       of_one_kind ? kHalf * rules_.excess(trial.held_out) : 0);
-      if (counted_within(instead, contest) < counted_within(trial, contest) + clearly ||
-          !holds_up(instead))
-        continue;
+      const double counts = counted_within(instead, contest);
+      if (counts < present + clearly || !holds_up(instead)) continue;
+      present = counts;
       trial = std::move(instead);
       numbers = other->numbers.size();
     }
@@ -273,7 +274,7 @@ class Search {
   }
 
   /// The same with all declared numbers within their tolerances: what pulls them further explains
-  /// less than it seems to, and what does not is not to give way to it.
+  /// less than it seems to, and what does not is not to give way to it. Anchored at `m` then.
   double counted_within(const FittedMachine& m, const Contest& contest) {
     const double counts = counted(within_tolerance(m), contest);
     evidence_.anchor(m.machine);
@@ -568,12 +569,11 @@ class Search {
         const double allowed_loss = simpler(*better) ? contest.band_of(lost)
                                     : number         ? -contest.band_of(lost)
                                                      : -options_.least_gain;
+        const double least = counted_within(m, contest) - allowed_loss;
         FittedMachine instead = less;
         add(instead, *better, {});
-        if (counted_within(instead, contest) >= counted_within(m, contest) - allowed_loss &&
-            holds_up(instead)) {
+        if (holds_up(instead) && counted_within(instead, contest) >= least) {
           m = std::move(instead);  // the last of its kind, so that the next one is here
-          evidence_.anchor(m.machine);
           continue;
         }
         rivals.erase(better);
