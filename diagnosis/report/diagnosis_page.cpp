@@ -8,6 +8,7 @@
 #include "analysis/html.hpp"
 #include "diagnosis/report/diagnosis_figures.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
+#include "diagnosis/report/shown_law.hpp"
 #include "diagnosis/search/freed_number.hpp"
 
 namespace vcnc {
@@ -239,7 +240,8 @@ std::string diagnosis_page(const DiagnosisStory& story) {
     page +=
         "<h2>A law without a name</h2>\n<p>" + escaped(d.law->words) +
         fmt::format(", which takes {:.0f} % of what is otherwise left.</p>\n", 100 * d.law->share) +
-        figure(law_figure(*d.law), "f, as it was learned, with the band of 95 %.");
+        figure(law_figure(*d.law),
+               "f, as it was learned, with the band of 95 %: " + law_numbers(*d.law) + ".");
     if (!d.law->not_distinguishable_from.empty()) {
       page += "<p>This run cannot tell it from:";
       for (const std::string& n : d.law->not_distinguishable_from)

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "model/axes.hpp"
 
@@ -54,6 +55,13 @@ std::string law_numbers(const LearnedLaw& learned) {
   if (law.value.empty()) return "";
   const Shown x = shown_covariate(law.over, is_rotary(static_cast<std::size_t>(law.over_axis))),
               y = shown_value(law);
+  if (law.jumps()) {
+    const auto half_width = [&](std::size_t i) { return (learned.high[i] - learned.low[i]) / 2; };
+    const double by = law.value[1] - law.value[0],
+                 within = std::hypot(half_width(0), half_width(1));
+    return fmt::format("by {:.3g} [{:.3g} .. {:.3g}] {}", by * y.factor, (by - within) * y.factor,
+                       (by + within) * y.factor, y.unit);
+  }
   const auto [least, most] = std::minmax_element(law.value.begin(), law.value.end());
   const auto one = [&](std::vector<double>::const_iterator at) {
     const auto i = static_cast<std::size_t>(at - law.value.begin());

@@ -107,6 +107,21 @@ TEST(LawFigure, DrawsTheCurveWithItsBandInTheUnitsOfPages) {
   EXPECT_NE(spring.find("f  [N per mm]"), std::string::npos) << spring;
 }
 
+TEST(LawFigure, ShowsOfAJumpWhatWasBeforeAndAfter) {
+  LearnedLaw learned;
+  learned.law.point = Law::Point::displacement;
+  learned.law.at = {30.001, 30.002};
+  learned.law.value = {-1e-6, 3e-6};
+  learned.low = {-1.3e-6, 2.6e-6};
+  learned.high = {-0.7e-6, 3.4e-6};
+  EXPECT_EQ(law_numbers(learned), "by 4 [3.5 .. 4.5] um");
+  const std::string text = law_figure(learned);
+  for (const char* part : {"28.001 -1 ", "30.001 -1 ", "30.002 3 ", "32.002 3 "})
+    EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+  learned.law.at = {10, 30};  // takes its time
+  EXPECT_FALSE(learned.law.jumps());
+}
+
 TEST(DiagnosisText, DigitsFollowTheInterval) {
   EXPECT_EQ(with_interval({"k", 1234.5678, 1200, 1270}), "1235 [1200 .. 1270]");
   EXPECT_EQ(with_interval({"k", 0.0123456, 0.0121, 0.0126}), "0.01235 [0.01210 .. 0.01260]");
