@@ -24,6 +24,7 @@ constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to loo
 constexpr double kHalf = 0.5;  ///< of what is left: for a further effect than few, or another one
 /// Times what was to be explained that two effects of one drive make each and take back together.
 constexpr double kCancels = 9;
+constexpr double kUnlikely = 3;          ///< pull of a declared number
 constexpr double kAtTheEnd = 2;          ///< times the least that a shape may be
 constexpr double kClearlySimpler = 0.5;  ///< numbers
 constexpr double kPartInALine = 0.25;  ///< of the least gain: less, and a wave is not worth a trial
@@ -115,7 +116,22 @@ class Search {
         break;
       if (!accept_one(now, from, next, contest)) break;
     }
+    hold_unlikely(now, first);
     return now;
+  }
+
+  /// Declared numbers that are pulled to where they hardly are, for next to nothing, stay as
+  /// declared: what an effect of the same drive lacks or has too much of, they would make up for.
+  void hold_unlikely(FittedMachine& m, const Contest& contest) {
+    FittedMachine held = vcnc::within_tolerance(evidence_, m, kUnlikely, [&](const FreedNumber& n) {
+      return may_be_released(options_, n);
+    });
+    const double gain = contest.held_out() - m.held_out;
+    if (going_ && held.found() > 0 &&
+        counted(held, contest) >= counted(m, contest) - contest.band_of(gain) && holds_up(held))
+      m = std::move(held);
+    for (FreedNumber& n : m.nuisances.numbers) n.held = false;
+    evidence_.anchor(m.machine);
   }
 
   /// What encoders make beyond what is reckoned with, and what recorded steps may make.
