@@ -126,9 +126,9 @@ class Search {
     FittedMachine held = vcnc::within_tolerance(evidence_, m, kUnlikely, [&](const FreedNumber& n) {
       return may_be_released(options_, n);
     });
-    const double gain = contest.held_out() - m.held_out;
-    if (going_ && held.found() > 0 &&
-        counted(held, contest) >= counted(m, contest) - contest.band_of(gain) && holds_up(held))
+    const double nothing = contest.band_of(contest.held_out());  // as if nothing were left
+    if (going_ && held.found() > 0 && counted(held, contest) >= counted(m, contest) - nothing &&
+        holds_up(held))
       m = std::move(held);
     for (FreedNumber& n : m.nuisances.numbers) n.held = false;
     evidence_.anchor(m.machine);
