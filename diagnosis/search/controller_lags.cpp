@@ -20,7 +20,7 @@ constexpr double kLagStep = 50e-6, kLongest = 2e-3;  // [s]
 constexpr double kUncertain = 1e-3;  // part of a lag's normal equation that holds it
 /// Of mean squares: what lags must take of r, and what r must be of the noise of the position.
 constexpr double kWorthIt = 0.5, kAboveNoise = 4;
-constexpr std::size_t kRough = 5;  // samples to either side
+constexpr std::size_t kAside = 5;  // samples to either side
 
 using Lag = double ServoParams::*;
 constexpr std::array<Lag, 2> kLags{&ServoParams::position_lag, &ServoParams::velocity_lag};
@@ -67,7 +67,7 @@ Machine with_lags_of(const Record& healthy, const Machine& declared) {
       if (round == 0) {
         const std::vector<double>& position =
             off[0][channel_of(channels, SignalKind::position, axis)];
-        if (left > kAboveNoise * mean_square_off_mean(position, kRough)) at_first[axis] = left;
+        if (left > kAboveNoise * mean_square_off_mean(position, kAside)) at_first[axis] = left;
       }
       ServoParams& servo = now.axes[axis].servo;
       if (round == kLagRounds) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "diagnosis/search/column_products.hpp"
 #include "diagnosis/search/comparable.hpp"
 #include "diagnosis/search/parallel.hpp"
 #include "model/axes.hpp"
@@ -25,17 +26,21 @@ constexpr double kQuieter = 0.8, kColoured = 1.1;
 /// an axis does; and how long before and after.
 constexpr double kUndecided = 6, kUndecidedReach = 0.02;  // [s]
 
-/// sum of a b, in doubles and several at a time.
-double dot(const float* a, const float* b, std::size_t n) {
-  constexpr std::size_t kLanes = 8;
-  double sum[kLanes] = {};
-  std::size_t k = 0;
-  for (; k + kLanes <= n; k += kLanes)
-    for (std::size_t j = 0; j < kLanes; ++j)
-      sum[j] += static_cast<double>(a[k + j]) * static_cast<double>(b[k + j]);
-  for (; k < n; ++k) sum[0] += static_cast<double>(a[k]) * static_cast<double>(b[k]);
-  return ((sum[0] + sum[4]) + (sum[1] + sum[5])) + ((sum[2] + sum[6]) + (sum[3] + sum[7]));
-}
+/// Those columns that have something in a channel, and where they stand among all.
+struct Present {
+  ColumnRefs columns;
+  std::vector<Eigen::Index> at;
+
+  Present(const std::vector<const Column*>& all, std::size_t channel) {
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (const std::vector<float>& z = (*all[i])[channel]; !z.empty())
+        columns.push_back(z.data()), at.push_back(static_cast<Eigen::Index>(i));
+  }
+  Eigen::MatrixXd none(const Present& across) const {
+    return Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(at.size()),
+                                 static_cast<Eigen::Index>(across.at.size()));
+  }
+};
 
 /// Of every series, over what is known of it; of nothing nought.
 std::vector<double> rms_of_all(const SeriesOfChannels& series) {
@@ -67,33 +72,6 @@ Machine without_slip(Machine machine) {
 }
 
 }  // namespace
-
-bool Column::zero() const {
-  for (std::size_t c = 0; c < size(); ++c)
-    if (!(*channels_)[c].empty()) return false;
-  return true;
-}
-
-std::vector<const Column*> pointers(const std::vector<Column>& columns) {
-  std::vector<const Column*> all;
-  for (const Column& c : columns) all.push_back(&c);
-  return all;
-}
-
-Column less(const Column& z, const std::vector<Column>& columns, const Eigen::VectorXd& step) {
-  Column::Channels left(z.size());
-  for (std::size_t c = 0; c < z.size(); ++c) {
-    left[c] = z[c];
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-      const std::vector<float>& column = columns[i][c];
-      if (column.empty()) continue;
-      left[c].resize(column.size(), 0.0F);
-      const auto s = static_cast<float>(step[static_cast<Eigen::Index>(i)]);
-      for (std::size_t k = 0; k < column.size(); ++k) left[c][k] -= s * column[k];
-    }
-  }
-  return left;
-}
 
 Evidence::Evidence(const Record& record, Replica& replica, const Machine& declared,
                    std::vector<double> noise_scale, const std::vector<double>& form)
@@ -419,6 +397,7 @@ bool Evidence::keep_comparable(std::size_t channel, std::vector<double>& change)
 Column::Channels Evidence::whitened(const SeriesOfChannels& change) const {
   Column::Channels column(change.size());
   for (std::size_t c = 0; c < change.size(); ++c) {
+    if (change[c].empty()) continue;
     std::vector<double> d = change[c];
     if (keep_comparable(c, d)) column[c] = whiten(c, d);
   }
@@ -506,74 +485,65 @@ std::vector<double> Evidence::rms_within_laps(const Prediction& prediction, Role
   return all;
 }
 
-void Evidence::add_products(const std::vector<const Column*>& columns, std::size_t channel,
-                            const RecordBlock& block, Eigen::MatrixXd& to) {
-  std::vector<std::size_t> present;
-  for (std::size_t i = 0; i < columns.size(); ++i)
-    if (!(*columns[i])[channel].empty()) present.push_back(i);
-  if (present.empty()) return;
-  const auto length = static_cast<Eigen::Index>(block.end - block.begin),
-             width = static_cast<Eigen::Index>(present.size());
-  Eigen::MatrixXd part(length, width);
-  for (Eigen::Index i = 0; i < width; ++i) {
-    const std::vector<float>& z = (*columns[present[static_cast<std::size_t>(i)]])[channel];
-    part.col(i) = Eigen::Map<const Eigen::VectorXf>(z.data() + block.begin, length).cast<double>();
-  }
-  const Eigen::MatrixXd products = part.transpose() * part;
-  for (Eigen::Index i = 0; i < width; ++i)
-    for (Eigen::Index j = 0; j < width; ++j)
-      to(static_cast<Eigen::Index>(present[static_cast<std::size_t>(i)]),
-         static_cast<Eigen::Index>(present[static_cast<std::size_t>(j)])) += products(i, j);
-}
-
 BlockGrams Evidence::grams(const std::vector<const Column*>& columns) const {
   const auto m = static_cast<Eigen::Index>(columns.size());
-  BlockGrams all(partition_.blocks.size());
-  parallel_for(all.size(), [&](std::size_t b) {
-    all[b] = Eigen::MatrixXd::Zero(m, m);
-    for (std::size_t c = 0; c < valid_.size(); ++c)
-      add_products(columns, c, partition_.blocks[b], all[b]);
-  });
+  BlockGrams all(partition_.blocks.size(), Eigen::MatrixXd::Zero(m, m));
+  for (std::size_t c = 0; c < valid_.size(); ++c) {
+    const Present x(columns, c);
+    parallel_for(all.size(), [&](std::size_t b) {
+      Eigen::MatrixXd sums = x.none(x);
+      add_products(x.columns, partition_.blocks[b].begin, partition_.blocks[b].end, sums);
+      all[b](x.at, x.at) += sums;
+    });
+  }
   return all;
 }
 
-RoleGrams Evidence::products(const std::vector<const Column*>& columns) const {
-  const auto m = static_cast<Eigen::Index>(columns.size());
-  RoleGrams all = RoleGrams::none(m, m, valid_.size());
+/// Sums what `add` adds of each block and channel, each role for itself.
+template <class Add>
+RoleGrams Evidence::summed(const std::vector<const Column*>& a, const std::vector<const Column*>& b,
+                           const Add& add) const {
+  RoleGrams all = RoleGrams::none(static_cast<Eigen::Index>(a.size()),
+                                  static_cast<Eigen::Index>(b.size()), valid_.size());
   parallel_for(valid_.size(), [&](std::size_t c) {
+    const Present x(a, c), y(b, c);
+    if (x.at.empty() || y.at.empty()) return;
+    Eigen::MatrixXd fitted = x.none(y), held_out = fitted;
     for (const RecordBlock& block : partition_.blocks)
-      add_products(columns, c, block, block.held_out ? all.held_out_of[c] : all.fitted_of[c]);
+      add(x, y, block, block.held_out ? held_out : fitted);
+    all.fitted_of[c](x.at, y.at) = fitted;
+    all.held_out_of[c](x.at, y.at) = held_out;
   });
   for (std::size_t c = 0; c < valid_.size(); ++c) {
     all.fitted += all.fitted_of[c];
     all.held_out += all.held_out_of[c];
   }
+  return all;
+}
+
+RoleGrams Evidence::products(const std::vector<const Column*>& columns) const {
+  const RecentProducts::Known known = recent_.most_of(columns);
+  RoleGrams all;
+  if (2 * known.old.size() > columns.size()) {
+    std::vector<const Column*> others;
+    for (const Eigen::Index i : known.others)
+      others.push_back(columns[static_cast<std::size_t>(i)]);
+    all = completed(known.made->grams, known.from, known.old, cross(others, columns), known.others);
+  } else {
+    all = summed(columns, columns,
+                 [](const Present& x, const Present&, const RecordBlock& block,
+                    Eigen::MatrixXd& to) { add_products(x.columns, block.begin, block.end, to); });
+  }
+  recent_.keep(columns, all);
   return all;
 }
 
 RoleGrams Evidence::cross(const std::vector<const Column*>& a,
                           const std::vector<const Column*>& b) const {
-  const auto rows = static_cast<Eigen::Index>(a.size()), cols = static_cast<Eigen::Index>(b.size());
-  RoleGrams all = RoleGrams::none(rows, cols, valid_.size());
-  parallel_for(valid_.size(), [&](std::size_t c) {
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::vector<float>& y = (*b[j])[c];
-      if (y.empty()) continue;
-      for (std::size_t i = 0; i < a.size(); ++i) {
-        const std::vector<float>& x = (*a[i])[c];
-        if (x.empty()) continue;
-        for (const RecordBlock& block : partition_.blocks)
-          (block.held_out ? all.held_out_of : all.fitted_of)[c](static_cast<Eigen::Index>(i),
-                                                                static_cast<Eigen::Index>(j)) +=
-              dot(&x[block.begin], &y[block.begin], block.end - block.begin);
-      }
-    }
-  });
-  for (std::size_t c = 0; c < valid_.size(); ++c) {
-    all.fitted += all.fitted_of[c];
-    all.held_out += all.held_out_of[c];
-  }
-  return all;
+  return summed(
+      a, b, [](const Present& x, const Present& y, const RecordBlock& block, Eigen::MatrixXd& to) {
+        add_products(x.columns, y.columns, block.begin, block.end, to);
+      });
 }
 
 Eigen::MatrixXd Evidence::sum(const BlockGrams& grams, Role role) const {

@@ -22,39 +22,16 @@
 
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
+#include "diagnosis/search/column.hpp"
 #include "diagnosis/search/gathering.hpp"
 #include "diagnosis/search/lap_events.hpp"
 #include "diagnosis/search/lap_shifts.hpp"
 #include "diagnosis/search/noise_audit.hpp"
 #include "diagnosis/search/partition.hpp"
+#include "diagnosis/search/recent_products.hpp"
 #include "diagnosis/search/role_grams.hpp"
 
 namespace vcnc {
-
-/// Whitened numbers, one series per channel; a channel that is zero throughout is empty. They never
-/// change; copies share them.
-class Column {
- public:
-  using Channels = std::vector<std::vector<float>>;
-
-  Column() = default;
-  Column(Channels channels) : channels_(std::make_shared<const Channels>(std::move(channels))) {}
-
-  std::size_t size() const { return channels_ ? channels_->size() : 0; }
-  const std::vector<float>& operator[](std::size_t channel) const { return (*channels_)[channel]; }
-  bool zero() const;
-  /// Whether both are the same numbers by being the same object.
-  bool shares(const Column& other) const { return channels_ == other.channels_; }
-
- private:
-  std::shared_ptr<const Channels> channels_;
-};
-
-/// Where each is, for what takes products of them.
-std::vector<const Column*> pointers(const std::vector<Column>& columns);
-
-/// z less the sum of step_i columns_i.
-Column less(const Column& z, const std::vector<Column>& columns, const Eigen::VectorXd& step);
 
 /// Products of columns, one matrix per block.
 using BlockGrams = std::vector<Eigen::MatrixXd>;
@@ -120,7 +97,7 @@ class Evidence {
   Column residual(const Prediction& prediction) const;
   /// W (changed - base) / step.
   Column sensitivity(const Prediction& base, const Prediction& changed, double step) const;
-  /// W d for a change of the prediction given as such.
+  /// W d for a change of the prediction given as such; an empty channel does not change.
   Column whiten(const SeriesOfChannels& change) const;
 
   /// Samples of a channel that count.
@@ -187,13 +164,14 @@ class Evidence {
   std::vector<Column::Channels> whitened_shifts(const Eigen::Vector3d& shift) const;
   /// Says nothing of samples that cannot be compared.
   void mask(SeriesOfChannels& series) const;
-  /// Adds the products in one block and channel.
-  static void add_products(const std::vector<const Column*>& columns, std::size_t channel,
-                           const RecordBlock& block, Eigen::MatrixXd& to);
+  template <class Add>
+  RoleGrams summed(const std::vector<const Column*>& a, const std::vector<const Column*>& b,
+                   const Add& add) const;
 
   const Record& record_;
   Replica& replica_;
   mutable Gathering gathering_;
+  mutable RecentProducts recent_;
   Partition partition_;
   SeriesOfChannels measured_;
   Prediction declared_;

@@ -183,6 +183,14 @@ void converge_exactly(Evidence& evidence, FittedMachine& m, const NoUse& no_use 
   }
 }
 
+/// Where all numbers stand.
+std::vector<double> stand(const FittedMachine& m) {
+  std::vector<double> all;
+  for (const FreedNumber& n : m.nuisances.numbers) all.push_back(n.value);
+  for (const FreedNumber& n : m.numbers()) all.push_back(n.value);
+  return all;
+}
+
 /// Takes sensitivities of `which` where the machine stands and fits, until that changes nothing, or
 /// would, if gains go on to shrink as they do; `gain` is that of the fit before.
 void fit_in_rounds(Evidence& evidence, FittedMachine& m, const std::vector<std::size_t>& which,
@@ -191,8 +199,10 @@ void fit_in_rounds(Evidence& evidence, FittedMachine& m, const std::vector<std::
   constexpr int kLinearisations = 8;
   for (int round = 0; round < kLinearisations; ++round) {
     const double before = m.held_out, off = misfit(evidence, m), last = gain;
+    const std::vector<double> from = stand(m);
     linearise(evidence, m, which);
     converge_exactly(evidence, m, no_use);
+    if (stand(m) == from) break;
     gain = std::max(before - m.held_out, off - misfit(evidence, m));
     const double next =
         last > 0 && std::isfinite(last) ? gain * std::sqrt(std::abs(gain) / last) : gain;

@@ -288,18 +288,19 @@ class Laws {
     return out;
   }
 
+  /// What a law changes; channels that it does not change are empty.
   SeriesOfChannels change(const Law& law) const {
     const Response& r = responses_[law.axis_index()];
     const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
     const Series y = strength(law);
-    SeriesOfChannels p(channels.size(), Series(y.size(), 0.0));
-    Series motion = y;
+    SeriesOfChannels p(channels.size());
     if (law.point == Law::Point::reading) {
       for (std::size_t c = 0; c < channels.size(); ++c)
         if (channels[c].kind == SignalKind::deflection && channels[c].axis == law.axis_index())
           p[c] = y;
       return p;
     }
+    Series motion = y;
     if (law.point == Law::Point::table_force) {
       const auto lead = static_cast<std::size_t>(std::round(kPulse / period_));
       motion.assign(y.size(), 0.0);
@@ -309,9 +310,11 @@ class Laws {
         if (channels[c].kind == SignalKind::position) motion = p[c];
       }
     }
-    for (std::size_t c = 0; c < channels.size(); ++c)
-      if (r.through_motion[c])
-        for (std::size_t k = 0; k < y.size(); ++k) p[c][k] = r.displacement[c][k] * motion[k];
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      if (!r.through_motion[c]) continue;
+      p[c].resize(y.size());
+      for (std::size_t k = 0; k < y.size(); ++k) p[c][k] = r.displacement[c][k] * motion[k];
+    }
     return p;
   }
 

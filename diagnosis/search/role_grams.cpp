@@ -45,6 +45,26 @@ RoleGrams bordered(const RoleGrams& a, const RoleGrams& across, const RoleGrams&
   return all;
 }
 
+RoleGrams completed(const RoleGrams& known, const std::vector<Eigen::Index>& from,
+                    const std::vector<Eigen::Index>& old, const RoleGrams& fresh,
+                    const std::vector<Eigen::Index>& others) {
+  const auto n = static_cast<Eigen::Index>(old.size() + others.size());
+  RoleGrams all = RoleGrams::none(n, n, known.fitted_of.size());
+  const auto complete = [&](Eigen::MatrixXd& to, const Eigen::MatrixXd& k,
+                            const Eigen::MatrixXd& f) {
+    to(old, old) = k(from, from);
+    to(others, Eigen::all) = f;
+    to(Eigen::all, others) = f.transpose();
+  };
+  complete(all.fitted, known.fitted, fresh.fitted);
+  complete(all.held_out, known.held_out, fresh.held_out);
+  for (std::size_t c = 0; c < known.fitted_of.size(); ++c) {
+    complete(all.fitted_of[c], known.fitted_of[c], fresh.fitted_of[c]);
+    complete(all.held_out_of[c], known.held_out_of[c], fresh.held_out_of[c]);
+  }
+  return all;
+}
+
 RoleGrams beside(const RoleGrams& a, const RoleGrams& b) {
   RoleGrams both{beside(a.fitted, b.fitted), beside(a.held_out, b.held_out), {}, {}};
   for (std::size_t c = 0; c < a.held_out_of.size(); ++c) {

@@ -23,6 +23,11 @@ struct RoleGrams {
 
 /// Products of [a, b] with themselves, from those of a, of a with b, and of b.
 RoleGrams bordered(const RoleGrams& a, const RoleGrams& across, const RoleGrams& b);
+/// Products of columns with each other, from those of some of them, `old`, that stand in `known` in
+/// the order of `from`; `fresh`: of the others with all. Indices are those of the result.
+RoleGrams completed(const RoleGrams& known, const std::vector<Eigen::Index>& from,
+                    const std::vector<Eigen::Index>& old, const RoleGrams& fresh,
+                    const std::vector<Eigen::Index>& others);
 /// Products of some columns with [a, b].
 RoleGrams beside(const RoleGrams& a, const RoleGrams& b);
 
