@@ -697,6 +697,8 @@ std::string usual_mistake(double factor) {
       Known{6e4, "60000: m/s and mm/min"},
       Known{25.4, "25.4: inches and mm"},
       Known{2, "2: diameter and radius, or periods and half periods"},
+      Known{10, "10: a decimal place"},
+      Known{100, "100: m and cm, or shares and percent"},
   };
   for (const Known& k : known)
     for (const double f : {k.factor, 1 / k.factor})

@@ -25,6 +25,7 @@ constexpr double kWrongAboutOne = 0.05;
 constexpr double kOfTheLeast = 0.1;
 constexpr double kPulse = 2e-3;        // half width of the pulse [s]
 constexpr std::size_t kInstants = 64;  // at which a jump is sought first
+constexpr double kLongestJump = 5e-3;  // [s]
 
 using Series = std::vector<double>;
 
@@ -201,13 +202,14 @@ class Laws {
     return at;
   }
 
-  /// A law without values that changes from one sample to this one.
+  /// A law without values that changes from one sample to this one, shortly before it where samples
+  /// are far from each other: it jumps (Law::jumps()).
   Law jump(std::size_t axis, Law::Point point, std::size_t sample) const {
     Law law;
     law.axis = law.over_axis = law.times_axis = static_cast<Law::OfAxis>(axis);
     law.point = point;
     const double time = evidence_.record().begin + static_cast<double>(sample) * period_;
-    law.at = {time - period_, time};
+    law.at = {time - std::min(period_, kLongestJump), time};
     return law;
   }
 

@@ -313,9 +313,13 @@ TEST(Diagnose, FitsALawWhereItActs) {
   EXPECT_NEAR(*high, 6e-6, 1.5e-6);
 }
 
+class AtARate : public testing::TestWithParam<double> {};
+
 /// What slips once is a law that jumps, not the slow wave or the drift that is most like it.
-TEST(Diagnose, TellsWhenSomethingSlipped) {
-  Record record = measured({}, 47);
+TEST_P(AtARate, TellsWhenSomethingSlipped) {
+  Record record = toy::commands(1000, 4);
+  record.period = GetParam();
+  toy::measure(record, {}, 47);
   const std::size_t at = record.samples() / 2 + 77;
   for (MeasuredSignal& s : record.signals)
     if (s.kind == SignalKind::deflection)
@@ -329,6 +333,8 @@ TEST(Diagnose, TellsWhenSomethingSlipped) {
   EXPECT_NEAR(law.value.back() - law.value.front(), 3e-6, 0.05e-6);
   EXPECT_NE(d.law->words.find("jumps at"), std::string::npos) << d.law->words;
 }
+
+INSTANTIATE_TEST_SUITE_P(OfDiagnose, AtARate, testing::Values(1e-3, 20e-3));
 
 /// The moving mass is declared as 500 kg with a tolerance of 1 %.
 TEST(Diagnose, TellsADeclaredNumberOutOfToleranceWithItsGain) {

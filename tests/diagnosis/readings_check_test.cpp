@@ -75,6 +75,8 @@ TEST(ReadingsCheck, NamesTheMistakeThatMakesAllReadingsTooLarge) {
             "read (a factor of 2: diameter and radius, or periods and half periods); check their "
             "unit, and the sizes of ball and piece");
   EXPECT_NE(refusal({0, 1, 2}, {25.4, 25.4, 25.4}).find("inches and mm"), std::string::npos);
+  EXPECT_NE(refusal({0, 1, 2}, {10, 10, 10}).find("a decimal place"), std::string::npos);
+  EXPECT_NE(refusal({0, 1, 2}, {100, 100, 100}).find("m and cm"), std::string::npos);
   EXPECT_EQ(refusal({0, 1, 2}, {1.3, 1.3, 1.3}), "");
   EXPECT_EQ(refusal({0, 1, 2}, {2, 2, 1}), "");
 }
