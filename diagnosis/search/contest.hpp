@@ -88,6 +88,7 @@ class Contest {
 
   /// How much it says: numbers that are something, and more where one is of an unusual size.
   double intricacy(const AddedEffect& effect) const;
+  double intricacy(const Contender& contender) const;
 
   /// Gains that differ by less are alike when the best is `gain`.
   double band_of(double gain) const;
@@ -110,7 +111,6 @@ class Contest {
   void refit_released(std::vector<Contender>& all, double least) const;
   void look_ahead(const std::vector<Screened>& screened, std::vector<Contender>& all) const;
   void put_simplest_first(std::vector<Contender>& all) const;
-  double intricacy(const Contender& contender) const;
   bool under_two_conditions(const Contender& contender) const;
   double needed_of(const Contender& contender) const;
   /// The same of candidates that leave `after` together.

@@ -15,22 +15,6 @@ using Series = std::vector<double>;
 
 constexpr double kDeviationPerMedian = 1.4826;  ///< of the sizes of normal numbers
 
-/// What a replica that computes in another order than the machine cannot be better than [SI].
-double exactness(const ComparedChannel& channel, const Series& residual) {
-  switch (channel.kind) {
-    case SignalKind::position:
-    case SignalKind::twist:
-      return is_rotary(channel.axis) ? 5e-9 : 1e-9;
-    case SignalKind::deflection:
-      return 5e-9;
-    default:
-      break;
-  }
-  double largest = 0;
-  for (const double r : residual) largest = std::max(largest, std::isfinite(r) ? std::abs(r) : 0);
-  return std::max(1e-6, 1e-7 * largest);
-}
-
 /// Less its straight line; NaN stays.
 void remove_line(Series& d) {
   double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
@@ -266,6 +250,21 @@ WhiteningFilter fit_autoregression(const std::vector<double>& covariance) {
   filter.a = std::move(a);
   filter.scale = std::sqrt(error);
   return filter;
+}
+
+double exactness(const ComparedChannel& channel, const Series& residual) {
+  switch (channel.kind) {
+    case SignalKind::position:
+    case SignalKind::twist:
+      return is_rotary(channel.axis) ? 5e-9 : 1e-9;
+    case SignalKind::deflection:
+      return 5e-9;
+    default:
+      break;
+  }
+  double largest = 0;
+  for (const double r : residual) largest = std::max(largest, std::isfinite(r) ? std::abs(r) : 0);
+  return std::max(1e-6, 1e-7 * largest);
 }
 
 std::vector<NoiseLine> vibrations(const Record& record, const Partition& partition,

@@ -71,6 +71,9 @@ struct NoiseAudit {
   std::vector<std::string> warnings;
 };
 
+/// What a replica that computes in another order than the machine cannot be better than [SI].
+double exactness(const ComparedChannel& channel, const std::vector<double>& residual);
+
 /// The strongest lines of one channel, at most three, where laps of a condition differ.
 std::vector<NoiseLine> vibrations(const Record& record, const Partition& partition,
                                   const ComparedChannel& channel,

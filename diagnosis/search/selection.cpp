@@ -178,6 +178,7 @@ class Search {
       FittedMachine trial =
           fitted_with(from, contenders[i],
                       i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
+      if (is_another_law(trial)) trial = with_dry_friction(std::move(trial));
       if (from.held_out - trial.held_out > contenders[i].needed && !says_the_same(trial, now) &&
           holds_up(trial)) {
         now = best_of_as_good(from, std::move(trial), contenders, i, contest);
@@ -209,13 +210,46 @@ class Search {
 
   /// Whether a friction went to the end at which its law is another one: a drag that builds up over
   /// no speed is dry friction.
+  bool is_another_law(const AddedEffect& a) const {
+    return candidates_[a.candidate].family == Family::friction &&
+           std::any_of(a.numbers.begin(), a.numbers.end(), [](const FreedNumber& n) {
+             return n.shape && n.number.min > 0 && n.value < kAtTheEnd * n.number.min;
+           });
+  }
   bool is_another_law(const FittedMachine& m) const {
-    return std::any_of(m.added.begin(), m.added.end(), [&](const AddedEffect& a) {
-      return candidates_[a.candidate].family == Family::friction &&
-             std::any_of(a.numbers.begin(), a.numbers.end(), [](const FreedNumber& n) {
-               return n.shape && n.number.min > 0 && n.value < kAtTheEnd * n.number.min;
-             });
-    });
+    return std::any_of(m.added.begin(), m.added.end(),
+                       [&](const AddedEffect& a) { return is_another_law(a); });
+  }
+
+  /// With dry friction of that size in place of such a law, all fitted again.
+  FittedMachine with_dry_friction(FittedMachine m) {
+    for (AddedEffect& a : m.added) {
+      const std::string& place = candidates_[a.candidate].place;
+      const auto dry = std::find_if(
+          candidates_.begin(), candidates_.end(),
+          [&](const Candidate& c) { return c.effect == "coulomb" && c.place == place; });
+      if (!is_another_law(a) || dry == candidates_.end()) continue;
+      const auto candidate = static_cast<std::size_t>(dry - candidates_.begin());
+      const bool there = std::any_of(m.added.begin(), m.added.end(), [&](const AddedEffect& b) {
+        return b.candidate == candidate;
+      });
+      const FreeNumber& level = dry->numbers.front();
+      if (there || has_key(m.nuisances.numbers, level.key)) continue;
+      const double size = a.numbers.front().value;
+      for (const FreeNumber& n : candidates_[a.candidate].numbers)
+        move_number(m.machine, n.key, number_of(declared_, n.key));
+      move_number(m.machine, level.key, size);
+      a = {.candidate = candidate,
+           .numbers = {{.number = level, .value = size, .centre = 0}},
+           .explained = a.explained};
+    }
+    evidence_.anchor(m.machine);
+    converge(evidence_, m);
+    settle_in(evidence_, m, {rules_.floor + options_.least_gain});
+    drop(m);
+    hold_again(m);
+    anchor_at(evidence_, m);
+    return m;
   }
 
   /// Whether the controller's own signals say that a gain is not what it is told to be, or all of
@@ -576,8 +610,13 @@ class Search {
       const auto simpler = [&](const Contender& r) {
         return effect && contest.says_it_simpler(r, *effect, lost);
       };
+      // What is missing still, one that has more numbers may imitate a little of.
+      const double imitated = kHalf * rules_.excess(m.held_out);
+      const auto clearly = [&](const Contender& r) {
+        return effect && contest.intricacy(r) > contest.intricacy(*effect) ? imitated : 0;
+      };
       const auto better = std::find_if(rivals.begin(), rivals.end(), [&](const Contender& r) {
-        return simpler(r) || r.worth() >= worth;
+        return simpler(r) || r.worth() >= worth + clearly(r);
       });
       if (better != rivals.end()) {
         // What takes the place of a declared number says more, and must do clearly better: else

@@ -9,31 +9,33 @@
 namespace vcnc::lap_events_test {
 namespace {
 
-constexpr std::size_t kLap = 5000, kLaps = 4;  // two conditions, twice each
+constexpr std::size_t kLap = 5000;
 const std::vector<ComparedChannel> kChannels{
     {SignalKind::position, 0}, {SignalKind::force, 0}, {SignalKind::deflection, 0}};
 
+/// Of two conditions, twice each unless told.
 struct Laps {
   Partition partition;
   SeriesOfChannels difference;
 
-  explicit Laps(std::uint64_t seed = 1) {
+  explicit Laps(std::uint64_t seed = 1, std::size_t times = 2) {
+    const std::size_t laps = 2 * times;
     partition.repeated = true;
-    for (std::size_t i = 0; i < kLaps; ++i)
+    for (std::size_t i = 0; i < laps; ++i)
       partition.stretches.push_back({i * kLap, (i + 1) * kLap, static_cast<int>(i % 2), 0, ""});
     for (std::uint64_t c = 0; c < kChannels.size(); ++c) {
       difference.emplace_back();
-      for (std::size_t k = 0; k < kLaps * kLap; ++k)
+      for (std::size_t k = 0; k < laps * kLap; ++k)
         difference.back().push_back(gaussian_noise(seed, c, k)[0]);
     }
   }
   std::vector<LapEvent> events() const {
     return lap_events(partition, 1e-3, kChannels, difference);
   }
-  /// A push at a sample that fades within some tens of samples.
-  void push(std::size_t channel, std::size_t at, double size) {
-    for (std::size_t k = 0; k < 100; ++k)
-      difference[channel][at + k] += size * std::exp(-static_cast<double>(k) / 20);
+  /// A push at a sample that fades within some tens of samples, or as told.
+  void push(std::size_t channel, std::size_t at, double size, double fades = 20) {
+    for (std::size_t k = 0; static_cast<double>(k) < 5 * fades; ++k)
+      difference[channel][at + k] += size * std::exp(-static_cast<double>(k) / fades);
   }
 };
 
@@ -94,6 +96,29 @@ TEST(LapEvents, WhatIsMissingIsNone) {
   Laps laps;
   for (std::size_t k = 1000; k < 3000; ++k) laps.difference[0][k] = kMissing;
   laps.push(0, 2000, 200);
+  EXPECT_TRUE(laps.events().empty());
+}
+
+/// The first lap has still what came before it, for longer than an event may take.
+TEST(LapEvents, OfTheOneLapThatIsOffWhereTheOthersAgree) {
+  Laps laps(1, 3);
+  laps.push(0, 0, 2000, 200);
+  const std::vector<LapEvent> events = laps.events();
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].begin, 0U);
+  EXPECT_EQ(events[0].end, 1050U);  // the push takes 1000 samples, and 50 ms more
+}
+
+TEST(LapEvents, NotOfALapThatIsOffAlmostThroughout) {
+  Laps laps(1, 3);
+  laps.push(0, 0, 2000, 1500);
+  EXPECT_TRUE(laps.events().empty());
+}
+
+TEST(LapEvents, NotWhereEveryLapIsAnotherOne) {
+  Laps laps(1, 3);
+  for (const std::size_t lap : {0, 2, 4})
+    laps.push(0, lap * kLap, 1000 * static_cast<double>(lap), 200);
   EXPECT_TRUE(laps.events().empty());
 }
 

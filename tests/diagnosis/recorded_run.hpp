@@ -21,10 +21,8 @@ struct RecordedRun {
   MachineReplica replica() const { return MachineReplica(record, declared, piece); }
 };
 
-/// The experiment on a machine with `effects`.
-inline RecordedRun recorded_run(Showing showing, std::size_t axis, const Effects& effects,
-                                const ExperimentOptions& options = {}) {
-  Experiment e = experiment(showing, axis, ideal_machine(), options);
+/// The experiment on its machine with `effects`.
+inline RecordedRun recorded_run(Experiment e, const Effects& effects) {
   RecordedRun run{{}, e.machine, e.machine, e.piece};
   run.true_machine.effects = e.machine.effects = effects;
   const Observation seen = observe(e);
@@ -34,6 +32,10 @@ inline RecordedRun recorded_run(Showing showing, std::size_t axis, const Effects
   if (e.piece) begin.piece_toml = to_toml(*e.piece);
   run.record = record_from(begin, seen.rows, seen.alarms);
   return run;
+}
+inline RecordedRun recorded_run(Showing showing, std::size_t axis, const Effects& effects,
+                                const ExperimentOptions& options = {}) {
+  return recorded_run(experiment(showing, axis, ideal_machine(), options), effects);
 }
 
 /// Difference of a prediction from what was recorded, over the channels of one kind.
