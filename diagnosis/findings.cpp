@@ -524,7 +524,7 @@ class Report {
     for (const auto& [axis, at] : times)
       d_.notes.push_back(fmt::format(
           "{} does not do the same in all laps about {} s, as an axis that stops in its friction "
-          "may; these moments were left out.",
+          "may, and in its first lap; these moments were left out.",
           kAxisNames[axis], at));
   }
 
