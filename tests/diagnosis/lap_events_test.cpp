@@ -117,7 +117,7 @@ TEST(LapEvents, NotOfALapThatIsOffAlmostThroughout) {
 
 TEST(LapEvents, NotWhereEveryLapIsAnotherOne) {
   Laps laps(1, 3);
-  for (const std::size_t lap : {0, 2, 4})
+  for (const std::size_t lap : {0U, 2U, 4U})
     laps.push(0, lap * kLap, 1000 * static_cast<double>(lap), 200);
   EXPECT_TRUE(laps.events().empty());
 }
