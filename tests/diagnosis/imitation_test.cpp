@@ -10,7 +10,6 @@
 #include "diagnosis/search/candidate.hpp"
 #include "diagnosis/search/freed_number.hpp"
 #include "recorded_run.hpp"
-#include "tests/sanitized.hpp"
 
 namespace vcnc::imitation_test {
 namespace {
@@ -30,7 +29,6 @@ Experiment laps_of_a_circle(int laps) {
 /// none, it is dry friction. And the first of three laps still rattles from what came before it,
 /// which is no noise of the others.
 TEST(Imitation, FrictionBesidePlayIsDryFriction) {
-  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
   Machine truth;
   move_number(truth, "effects.X.backlash.gap_um", 8);
   move_number(truth, "effects.X.coulomb.level_N", 40);
