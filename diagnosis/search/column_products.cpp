@@ -1,7 +1,6 @@
 #include "diagnosis/search/column_products.hpp"
 
 #include <algorithm>
-#include <cstring>
 
 namespace vcnc {
 namespace {
@@ -9,8 +8,7 @@ namespace {
 constexpr std::size_t kRows = 4, kCols = 2;  ///< of a tile, whose sums fit in 16 registers
 constexpr std::size_t kChunk = 1024;         ///< samples that stay in the cache
 
-// Vectors of the compiler: two halves where the processor has no registers that wide.
-using FourFloats = float __attribute__((vector_size(16)));
+/// A vector of the compiler: two halves where the processor has no registers that wide.
 using FourDoubles = double __attribute__((vector_size(32)));
 
 /// Products of R columns with C others.
@@ -21,17 +19,11 @@ template <std::size_t R, std::size_t C>
   FourDoubles sum[R][C] = {};
   std::size_t k = begin;
   for (; k + 4 <= end; k += 4) {
-    FourDoubles a[R], b[C];
-    for (std::size_t i = 0; i < R; ++i) {
-      FourFloats f;
-      std::memcpy(&f, x[i] + k, sizeof f);
-      a[i] = __builtin_convertvector(f, FourDoubles);
-    }
-    for (std::size_t j = 0; j < C; ++j) {
-      FourFloats f;
-      std::memcpy(&f, y[j] + k, sizeof f);
-      b[j] = __builtin_convertvector(f, FourDoubles);
-    }
+    FourDoubles a[R], b[C];  // widened by loops, of which GCC makes one instruction each
+    for (std::size_t i = 0; i < R; ++i)
+      for (std::size_t l = 0; l < 4; ++l) a[i][l] = static_cast<double>(x[i][k + l]);
+    for (std::size_t j = 0; j < C; ++j)
+      for (std::size_t l = 0; l < 4; ++l) b[j][l] = static_cast<double>(y[j][k + l]);
     for (std::size_t i = 0; i < R; ++i)
       for (std::size_t j = 0; j < C; ++j) sum[i][j] += a[i] * b[j];
   }
