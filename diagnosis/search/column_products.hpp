@@ -4,7 +4,7 @@
 //
 // Columns are floats, products and sums doubles. A tile of columns goes through the samples
 // together, so that each sample is read and widened once for several products. Processors that have
-// AVX2 use it; only the order of the sums differs between them.
+// AVX2 use it, to the same bits.
 #pragma once
 
 #include <Eigen/Dense>
