@@ -121,12 +121,19 @@ Contest::Contest(const ContestRules& rules, const FittedMachine& now)
       ground_(rules.evidence, now.residual, linear_),
       doubt_(now.found() == 0 ? doubt_of(rules.options, now.rounding)
                               : doubt_of(rules.options, now.explained(), rules.base_of,
-                                         ground_.held_out_of, now.rounding)) {}
+                                         ground_.held_out_of, now.rounding)),
+      doubt_anywhere_(doubt_of(rules.options, now.rounding)),
+      acting_(now.acting()) {
+  if (any_at_rest())
+    at_rest_ =
+        chi2_at_rest(rules.evidence, less(now.residual, linear_.columns, ground_.step), acting_);
+}
 
 std::vector<Contender> Contest::contenders() {
   const std::vector<Screened> all_trials = screen(rules_.evidence, ground_, doubt_,
                                                   rules_.candidates, rules_.trials),
-                              all_screened = by_what_counts(best_of_each(all_trials)),
+                              all_screened =
+                                  by_what_counts(counted_by_samples(best_of_each(all_trials))),
                               list = worth_a_refit(
                                   all_screened, rules_.options, [&](const Screened&of) {
                                     return rules_.candidates[candidate_of(of)].family;
@@ -142,7 +149,7 @@ std::vector<Contender> Contest::contenders() {
   for (Contender& c : releases(Released::where_pulled, best)) all.push_back(std::move(c));
   for (Contender& c : all) {
     c.needed = needed_of(c);
-    c.counts = counts(c.gain, c.fit.held_out_of);
+    c.counts = counts(c);
   }
   std::erase_if(all, [&](const Contender& c) {
     return c.gain <= c.needed || c.counts <= c.needed ||
@@ -168,7 +175,7 @@ std::vector<Contender> Contest::rivals(double least, std::size_t but) const {
   finish(all);
   for (Contender& c : releases(Released::anywhere, least))
     if (c.gain >= least) all.push_back(std::move(c));
-  for (Contender& c : all) c.counts = counts(c.gain, c.fit.held_out_of);
+  for (Contender& c : all) c.counts = counts(c);
   sort_by_worth(all);
   return all;
 }
@@ -363,7 +370,7 @@ void Contest::begin_elsewhere(Contender& best, const std::vector<Screened>& tria
     others.back().needed = needed_of(others.back());
   }
   finish(others);
-  for (Contender& c : others) c.counts = counts(c.gain, c.fit.held_out_of);
+  for (Contender& c : others) c.counts = counts(c);
   for (Contender& c : others)
     if (c.fit.fitted < best.fit.fitted && c.gain > best.gain) best = std::move(c);
 }
@@ -392,6 +399,8 @@ std::vector<Contender> Contest::releases(Released which, double as_much) const {
     c.numbers = {n};
     c.gain = ground_.held_out - s.held_out;
     c.fit.held_out_of = left_after(ground_.grams.held_out_of, s.step);
+    c.fit.residual = now_.residual;
+    c.fit.linear_step = s.step;
     all.push_back(std::move(c));
     all.back().numbers.front().value = value;
     all.back().numbers.front().held = false;
@@ -442,12 +451,53 @@ double Contest::needed_at(const std::set<std::string>& drives,
       needed, rules_.options.share_beside * rules_.left_where_gained(ground_.held_out_of, after));
 }
 
-double Contest::counts(double gain, const std::vector<double>& after) const {
+double Contest::counts(const Contender& c) const {
+  return counts(c.gain, c.fit.held_out_of, [&] {
+    const LinearPart others = without(linear_, c.numbers);
+    const bool of_all = c.fit.linear_step.size() == ground_.step.size();  // released along a column
+    return less(c.fit.residual, of_all ? linear_.columns : others.columns, c.fit.linear_step);
+  });
+}
+
+double Contest::counts(const FittedMachine& m) const {
+  const LinearPart linear = m.linear();
+  const Ground ground(rules_.evidence, m.residual, linear);
+  return counts(ground_.held_out - m.held_out, ground.held_out_of,
+                [&] { return less(m.residual, linear.columns, ground.step); });
+}
+
+double Contest::counts(double gain, const std::vector<double>& after,
+                       const std::function<Column()>& left) const {
+  std::vector<double> at_rest(after.size(), 0.0);
+  if (!at_rest_.empty()) {
+    at_rest = chi2_at_rest(rules_.evidence, left(), acting_);
+    for (std::size_t c = 0; c < after.size(); ++c) at_rest[c] = at_rest_[c] - at_rest[c];
+  }
+  const auto of = [&](double all) {
+    return counted(all, ground_.held_out_of, after, doubt_, doubt_anywhere_, at_rest);
+  };
   // A tolerance that is not strained any more is no gain where none of the samples' counts.
   double of_samples = 0;
   for (std::size_t c = 0; c < after.size(); ++c) of_samples += ground_.held_out_of[c] - after[c];
-  const double count = counted(of_samples, ground_.held_out_of, after, doubt_);
-  return count <= 0 ? count : counted(gain, ground_.held_out_of, after, doubt_);
+  const double count = of(of_samples);
+  return count <= 0 ? count : of(gain);
+}
+
+/// Whether there are samples at which nothing of what was found does anything.
+bool Contest::any_at_rest() const {
+  return !acting_.empty() && std::none_of(acting_.begin(), acting_.end(),
+                                          [](const ActingSlices& a) { return a.empty(); });
+}
+
+std::vector<Screened> Contest::counted_by_samples(std::vector<Screened> screened) const {
+  if (at_rest_.empty()) return screened;
+  parallel_for(screened.size(), [&](std::size_t i) {
+    Screened& s = screened[i];
+    if (s.gain < kPromise * rules_.options.least_gain || s.counted >= s.gain) return;
+    const Column left = left_by(ground_, rules_.trials[s.trial]);
+    s.counted = counts(s.gain, rules_.evidence.chi2_of(left, Role::held_out), [&] { return left; });
+  });
+  return screened;
 }
 
 /// Held-out gain per condition: an effect that shows under several must help under two.
@@ -507,7 +557,7 @@ void Contest::look_ahead(const std::vector<Screened>& screened, std::vector<Cont
   if (best->counted < std::max(single, either) + least) return;
   Contender c = contender({best->trial, screened[other].trial}, best->size, best->gain);
   c.needed = needed_of({c.candidate, candidate_of(screened[other])}, c.fit.held_out_of);
-  c.counts = counts(c.gain, c.fit.held_out_of);
+  c.counts = counts(c);
   if (c.counts > single + least && rules_.stands_out(ground_.held_out_of, c.fit.held_out_of))
     all.insert(all.begin(), std::move(c));
 }

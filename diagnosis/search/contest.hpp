@@ -93,10 +93,17 @@ class Contest {
   /// Gains that differ by less are alike when the best is `gain`.
   double band_of(double gain) const;
   double held_out() const { return ground_.held_out; }
-  /// What counts of a gain that leaves `after` (counted_gain.hpp).
-  double counts(double gain, const std::vector<double>& after) const;
+  /// What counts of the gain of a machine (counted_gain.hpp).
+  double counts(const FittedMachine& machine) const;
 
  private:
+  double counts(const Contender& contender) const;
+  /// The same of a gain that leaves `after` of the channels, and `left()` of all samples.
+  double counts(double gain, const std::vector<double>& after,
+                const std::function<Column()>& left) const;
+  bool any_at_rest() const;
+  /// Screened by products of whole channels, counted anew by samples.
+  std::vector<Screened> counted_by_samples(std::vector<Screened> screened) const;
   std::vector<Screened> best_of_each(const std::vector<Screened>& trials) const;
   std::vector<Screened> likes_of(const std::vector<Contender>& all,
                                  const std::vector<Screened>& screened,
@@ -124,7 +131,9 @@ class Contest {
   const FittedMachine& now_;
   LinearPart linear_;
   Ground ground_;
-  Doubt doubt_;
+  Doubt doubt_, doubt_anywhere_;      ///< of all, and of what has nothing to do with what was found
+  std::vector<ActingSlices> acting_;  ///< of what was found
+  std::vector<double> at_rest_;       ///< held-out chi-square while none of it acts
 };
 
 }  // namespace vcnc

@@ -46,8 +46,17 @@ Doubt doubt_of(const DiagnosisOptions& options, const std::vector<Explained>& fo
 
 double counted(double gain, const std::vector<double>& before, const std::vector<double>& after,
                const Doubt& doubt) {
-  for (std::size_t c = 0; c < doubt.size(); ++c)
-    gain -= std::clamp(before[c] - after[c], 0.0, doubt[c]);
+  return counted(gain, before, after, doubt, {}, std::vector<double>(doubt.size(), 0.0));
+}
+
+double counted(double gain, const std::vector<double>& before, const std::vector<double>& after,
+               const Doubt& doubt, const Doubt& anywhere, const std::vector<double>& at_rest) {
+  for (std::size_t c = 0; c < doubt.size(); ++c) {
+    const double of_channel = before[c] - after[c];
+    const double while_acting = std::max(0.0, of_channel - at_rest[c]);
+    gain -= std::min(std::clamp(of_channel, 0.0, doubt[c]),
+                     while_acting + (c < anywhere.size() ? anywhere[c] : 0.0));
+  }
   return gain;
 }
 

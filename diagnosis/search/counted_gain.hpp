@@ -5,8 +5,9 @@
 // channel only that counts which exceeds such a part. An effect that leaves next to nothing in the
 // channel where it explains most has been seen to be right, and is doubted less everywhere. What
 // was brought into a channel where nothing was is no gain of the next one that takes it out again.
-// What encoders round off is known as a sample only, and repeats (friction that is stirred by it is
-// another friction): a twentieth of its chi-square counts for nobody, either.
+// What is gained while no found effect does anything (acting_slices.hpp) is doubted as if none
+// were. What encoders round off is known as a sample only, and repeats (friction that is stirred by
+// it is another friction): a twentieth of its chi-square counts for nobody, either.
 #pragma once
 
 #include <vector>
@@ -34,5 +35,9 @@ Doubt doubt_of(const DiagnosisOptions& options, const std::vector<double>& round
 /// Of `gain`, which came from `before` going down to `after` in the channels.
 double counted(double gain, const std::vector<double>& before, const std::vector<double>& after,
                const Doubt& doubt);
+/// The same where `at_rest` of the gain of each channel comes from samples at which no found effect
+/// acts: there `anywhere` alone is doubted.
+double counted(double gain, const std::vector<double>& before, const std::vector<double>& after,
+               const Doubt& doubt, const Doubt& anywhere, const std::vector<double>& at_rest);
 
 }  // namespace vcnc

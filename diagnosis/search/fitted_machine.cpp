@@ -249,6 +249,13 @@ std::vector<Explained> FittedMachine::explained() const {
   return all;
 }
 
+std::vector<ActingSlices> FittedMachine::acting() const {
+  std::vector<ActingSlices> all;
+  for (const AddedEffect& a : added) all.push_back(a.acts);
+  all.resize(found());
+  return all;
+}
+
 std::set<std::string> places_found(const FittedMachine& m) {
   std::set<std::string> places;
   for (const FreedNumber& n : m.numbers()) places.insert(place_of(n.number.key));

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/search/acting_slices.hpp"
 #include "diagnosis/search/candidate.hpp"
 #include "diagnosis/search/counted_gain.hpp"
 #include "diagnosis/search/evidence.hpp"
@@ -22,6 +23,7 @@ struct AddedEffect {
   std::vector<FreedNumber> numbers{};
   double gain = 0;
   Explained explained{};                  ///< held-out chi-square per channel, back without it
+  ActingSlices acts{};                    ///< when it does something
   std::vector<std::size_t> class_with{};  ///< candidates that do as well
 };
 
@@ -47,6 +49,7 @@ struct FittedMachine {
   std::vector<FreedNumber> numbers() const;  ///< of all added effects
   std::size_t found() const { return added.size() + released.size(); }
   std::vector<Explained> explained() const;  ///< by each, and each released number
+  std::vector<ActingSlices> acting() const;  ///< each of the same
   /// Nuisances and added effects with their columns.
   LinearPart linear() const;
   /// With a declared number that was released held again as in `base`, nothing fitted.

@@ -27,13 +27,18 @@ struct Gain {
   Eigen::VectorXd size;
 };
 
+/// Along the columns of the ground and others, from the products of all.
+LinearStep step_of(const Ground& ground, const RoleGrams& all, Eigen::Index more) {
+  return linear_step(all.fitted, all.held_out, padded(ground.precision, more),
+                     padded(ground.offset, more));
+}
+
 /// Of columns with the products `across` with the ground and their `own`.
 Gain gain_of(const Ground& ground, const Doubt& doubt, const RoleGrams& across,
              const RoleGrams& own) {
   const Eigen::Index more = own.fitted.rows();
   const RoleGrams all = bordered(ground.grams, across, own);
-  const LinearStep full = linear_step(all.fitted, all.held_out, padded(ground.precision, more),
-                                      padded(ground.offset, more));
+  const LinearStep full = step_of(ground, all, more);
   const double gain = ground.held_out - full.held_out;
   return {gain,
           gain > 0 && !doubt.empty()
@@ -152,6 +157,7 @@ Ground::Ground(const Evidence& evidence, const Column& residual, const LinearPar
   for (const Column& c : linear.columns) columns.push_back(&c);
   grams = evidence.products(columns);
   const LinearStep at = linear_step(grams.fitted, grams.held_out, precision, offset);
+  step = at.step;
   fitted = at.fitted;
   held_out = at.held_out;
   held_out_of = left_after(grams.held_out_of, at.step);
@@ -177,6 +183,14 @@ std::vector<Screened> screen(const Evidence& evidence, const Ground& ground, con
   std::stable_sort(all.begin(), all.end(),
                    [](const Screened& x, const Screened& y) { return x.gain > y.gain; });
   return all;
+}
+
+Column left_by(const Ground& ground, const TrialColumns& trial) {
+  const RoleGrams all = bordered(ground.grams, trial.ground.products(), trial.own);
+  std::vector<Column> columns;
+  for (std::size_t i = 1; i < ground.columns.size(); ++i) columns.push_back(*ground.columns[i]);
+  for (const PackedColumn& c : trial.columns) columns.push_back(c.unpacked());
+  return less(*ground.columns.front(), columns, step_of(ground, all, trial.own.fitted.rows()).step);
 }
 
 Screened screen_pair(const Evidence& evidence, const Ground& ground, const Doubt& doubt,

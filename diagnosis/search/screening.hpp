@@ -66,6 +66,7 @@ struct Ground {
   std::vector<const Column*> columns;  ///< the residual, then those of the linear numbers
   RoleGrams grams;
   Eigen::VectorXd precision, offset;
+  Eigen::VectorXd step;             ///< of the linear numbers
   double fitted = 0, held_out = 0;  ///< chi-square with priors, the linear numbers fitted
   std::vector<double> held_out_of;  ///< of it per channel, without priors
 };
@@ -74,6 +75,9 @@ struct Ground {
 std::vector<Screened> screen(const Evidence& evidence, const Ground& ground, const Doubt& doubt,
                              const std::vector<Candidate>& candidates,
                              std::vector<TrialColumns>& trials);
+
+/// The residual less what a trial that was screened on this ground explains of it.
+Column left_by(const Ground& ground, const TrialColumns& trial);
 
 /// Of two trials together that were screened on this ground; `trial` means the first.
 Screened screen_pair(const Evidence& evidence, const Ground& ground, const Doubt& doubt,

@@ -104,6 +104,8 @@ class Search {
       now.rounding = rounding_of(now);
       look_again(now);
       exchange(now);
+      for (std::size_t i = 0; i < now.added.size(); ++i)
+        if (now.added[i].acts.empty()) weigh(now, i);  // one that took a place
       now.rounding = rounding_of(now);
       ladder.push_back(step_of(now, ladder.size()));
       if (now.found() >= options_.max_effects) break;
@@ -127,7 +129,7 @@ class Search {
       return may_be_released(options_, n);
     });
     const double nothing = contest.band_of(contest.held_out());  // as if nothing were left
-    if (going_ && held.found() > 0 && counted(held, contest) >= counted(m, contest) - nothing &&
+    if (going_ && held.found() > 0 && contest.counts(held) >= contest.counts(m) - nothing &&
         holds_up(held))
       m = std::move(held);
     for (FreedNumber& n : m.nuisances.numbers) n.held = false;
@@ -326,16 +328,13 @@ class Search {
   /// The same with all declared numbers within their tolerances: what pulls them further explains
   /// less than it seems to, and what does not is not to give way to it. Anchored at `m` then.
   double counted_within(const FittedMachine& m, const Contest& contest) {
-    const double counts = counted(within_tolerance(m), contest);
+    const double counts = contest.counts(within_tolerance(m));
     evidence_.anchor(m.machine);
     return counts;
   }
 
   /// What counts of the gain of a machine that came out of a contest.
-  double counted(const FittedMachine& m, const Contest& contest) const {
-    return contest.counts(contest.held_out() - m.held_out,
-                          Ground(evidence_, m.residual, m.linear()).held_out_of);
-  }
+  double counted(const FittedMachine& m, const Contest& contest) const { return contest.counts(m); }
 
   /// With a contender, everything fitted together.
   FittedMachine fitted_with(const FittedMachine& now, const Contender& contender,
@@ -560,6 +559,7 @@ class Search {
   /// What one added effect is worth: without it, all others moved along their columns.
   double weigh(FittedMachine& m, std::size_t i) const {
     const FittedMachine less = taken_out(m, i, Common::held);
+    m.added[i].acts = acting_slices(evidence_.record(), m.residual, less.residual);
     const Ground ground(evidence_, less.residual, less.linear());
     m.added[i].explained = minus(ground.held_out_of, evidence_.chi2_of(m.residual, Role::held_out));
     return m.added[i].gain = ground.held_out - m.held_out;
@@ -606,7 +606,7 @@ class Search {
         if (r.released.empty() && r.gain > std::max(lost - contest.band_of(lost), 0.5 * lost))
           alike.push_back(r.candidate);
       const double worth =
-          counted(m, contest) - 4 * static_cast<double>(effect ? effect->numbers.size() : 1);
+          contest.counts(m) - 4 * static_cast<double>(effect ? effect->numbers.size() : 1);
       const auto simpler = [&](const Contender& r) {
         return effect && contest.says_it_simpler(r, *effect, lost);
       };

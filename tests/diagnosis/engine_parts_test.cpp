@@ -469,6 +469,18 @@ TEST(CountedGain, LeavesOutWhatTheFormOfTheModelMayMake) {
   EXPECT_DOUBLE_EQ(counted(110, {500, 600}, {490, 500}, doubt), 0);
 }
 
+TEST(CountedGain, DoubtsNothingThatIsGainedWhileNoFoundEffectActs) {
+  const Doubt doubt{70, 100}, anywhere{50};
+  const std::vector<double> before{500, 600}, after{200, 400};
+  const auto of = [&](const std::vector<double>& at_rest) {
+    return counted(500, before, after, doubt, anywhere, at_rest);
+  };
+  EXPECT_DOUBLE_EQ(of({0, 0}), counted(500, before, after, doubt));
+  EXPECT_DOUBLE_EQ(of({295, 150}), 500 - 55 - 50);
+  // What is lost while it acts is lost; more than all cannot be gained at rest.
+  EXPECT_DOUBLE_EQ(of({400, 300}), 500 - 50);
+}
+
 TEST(CountedGain, DoubtsAnEffectLessThatWasSeenToBeRight) {
   DiagnosisOptions options;
   options.share_of_found = 0.01;
@@ -501,6 +513,29 @@ struct QuietContest {
     return {evidence, none, options, trials, {}, floor, std::move(floor_of), {}};
   }
 };
+
+TEST(ActingSlices, AreThoseInWhichTheResidualChangesAndTheirNeighbours) {
+  const QuietContest contest;
+  const std::size_t n = contest.record.samples(), slice = 50;  // of a millisecond each
+  std::vector<float> with(n, 1.0F), without = with;
+  for (std::size_t k = 3 * slice + 7; k < 3 * slice + 9; ++k) without[k] = 30.0F;
+  without[10 * slice] = 1.01F;  // next to nothing
+  const Column a({with, with, {}}), b({without, with, {}});
+  const ActingSlices acts = acting_slices(contest.record, a, b);
+  ASSERT_EQ(acts.size(), 3u);
+  for (std::size_t i = 0; i < n / slice; ++i) {
+    EXPECT_EQ(static_cast<bool>(acts[0][i]), i >= 2 && i <= 4) << i;
+    EXPECT_FALSE(acts[1][i] || acts[2][i]) << i;
+  }
+  // Of held-out samples, those of the other slices are left.
+  double rest = 0;
+  for (const RecordBlock& block : contest.evidence.partition().blocks)
+    for (std::size_t k = block.begin; block.held_out && k < block.end; ++k)
+      rest += k < 2 * slice || k >= 5 * slice;
+  EXPECT_GT(rest, 0);
+  EXPECT_EQ(chi2_at_rest(contest.evidence, a, {acts})[0], rest);
+  EXPECT_EQ(chi2_at_rest(contest.evidence, a, {acts, {}})[0], 0);  // of one nobody knows when
+}
 
 TEST(Threshold, CountsWhatIsLeftInTheChannelsThatGain) {
   QuietContest contest;

@@ -146,6 +146,29 @@ TEST(Selection, WhatIsFoundIsNotKnownWellEnoughForAnEffectBehindIt) {
   EXPECT_EQ(names(found(0.1), toy::candidates()), "X.load_play");
 }
 
+TEST(Selection, BetweenClippedReadingsAnEffectIsSeenAsIfNothingClipped) {
+  // A tilt that is declared makes the reading 9 um large, of which a third is clipped: play does
+  // less than half a percent of that, but most of it where nothing is clipped.
+  Record record = toy::commands(1000, 4);
+  const std::pair<std::string, double> tilt{"effects.geometry.squareness.xy_urad", 300};
+  const Machine declared = toy::machine({tilt});
+  toy::measure(record,
+               toy::machine({tilt,
+                             {"effects.probe.range_clip.limit_mm", 0.006},
+                             {"effects.X.load_play.width_um", 0.1}}),
+               13);
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, declared);
+  std::vector<Candidate> candidates = toy::candidates();
+  candidates.push_back(
+      {"range_clip", "probe", {{"effects.probe.range_clip.limit_mm", 0.4, 0, 50, true}}, {}});
+  DiagnosisOptions options;
+  options.share_of_found = 0.005;
+  const SelectionResult result = select_effects_of(evidence, declared, candidates, options, {});
+  EXPECT_EQ(names(result, candidates), "probe.range_clip X.load_play");
+  EXPECT_NEAR(number_of(result.found.machine, "effects.X.load_play.width_um"), 0.1, 0.02);
+}
+
 TEST(Selection, EndsAtTheMostEffectsThatAreAllowed) {
   Record record = toy::commands(1000, 4);
   const Machine truth = toy::machine(

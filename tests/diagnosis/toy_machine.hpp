@@ -2,6 +2,7 @@
 // lines, signals that are sums of known functions of the command, and white noise.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -48,7 +49,7 @@ inline Record commands(std::size_t lap, int laps) {
 ///   F_x = m a + F_c s(v) + k v          load (declared 500 kg), coulomb, viscous
 ///   d_x = e_x + eps q_x + alpha q_y     scale_error, squareness
 ///         + w/2 s(v) + A sin(2 pi q/p + psi) + o    load_play, pitch_periodic, piece_offset
-///         + laws of the displacement of X + a slip of the period counter
+///         + laws of the displacement of X + a slip of the period counter, up to range_clip
 class ToyReplica : public Replica {
  public:
   explicit ToyReplica(const Record& commands) : commands_(commands) {
@@ -66,6 +67,7 @@ class ToyReplica : public Replica {
     const PitchPeriodic& pitch = e.get<PitchPeriodic>();
     const double offset = m.effects.get<PieceOffset>().shift.x();
     const PeriodSlip& slip = m.effects.get<PeriodSlip>();
+    const RangeClip& clip = m.effects.get<RangeClip>();
     std::vector<std::vector<double>> all(3, std::vector<double>(x.size()));
     for (std::size_t k = 0; k < x.size(); ++k) {
       const std::size_t before = k > 0 ? k - 1 : k, after = k + 1 < x.size() ? k + 1 : k;
@@ -88,6 +90,7 @@ class ToyReplica : public Replica {
           all[2][k] += law(static_cast<double>(k) * h, motions);
       if (static_cast<double>(k) * h + 0.5 * h >= slip.start)
         all[2][k] += slip.periods * m.probe.signal_period;
+      if (clip.limit > 0) all[2][k] = std::clamp(all[2][k], -clip.limit, clip.limit);
     }
     return {all.begin(), all.end()};
   }
