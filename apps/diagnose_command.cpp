@@ -165,7 +165,7 @@ int compare_models(const DiagnoseOptions& options, const Record& record, const M
 /// was read, an axis that stands shows, too.
 bool is_unrecorded_axis(const std::string& place, const Record& record) {
   for (const MeasuredSignal& s : record.signals)
-    if (s.kind == SignalKind::deflection || place == kAxisNames[s.axis]) return false;
+    if (is_reading(s.kind) || place == kAxisNames[s.axis]) return false;
   return std::find(kAxisNames.begin(), kAxisNames.end(), place) != kAxisNames.end();
 }
 
@@ -207,6 +207,9 @@ std::vector<Candidate> candidates_of(const DiagnoseOptions& options, const Recor
   check_recorded(options.suspects, all, numbers, record);
   all = suspected(std::move(all), numbers, options.suspects);
   std::erase_if(all, [&](const Candidate& c) { return is_unrecorded_axis(c.place, record); });
+  // About one place an axis that turns as it goes looks out of square and of another scale.
+  if (record.bar && options.suspects.empty())
+    std::erase_if(all, [](const Candidate& c) { return c.effect == "angular_errors"; });
   return all;
 }
 

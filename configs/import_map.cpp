@@ -53,6 +53,8 @@ constexpr std::array kUnits{
     MeasuredUnit{"min", Dimension::time, 60},
 };
 
+constexpr double kLeastSweep = 10 * kDegree;  // of an arc
+
 constexpr std::array<std::string_view, 3> kProbeNames{"x", "y", "z"};
 
 /// What a signal may be measured in.
@@ -65,6 +67,7 @@ std::vector<Dimension> dimensions(ColumnKind kind, bool rotary) {
     case ColumnKind::added_force:
       return {rotary ? Dimension::torque : Dimension::force};
     case ColumnKind::deflection:
+    case ColumnKind::bar:
       return {Dimension::length};
     case ColumnKind::cosine:
     case ColumnKind::sine:
@@ -87,7 +90,7 @@ bool of_probe(ColumnKind kind) {
   return kind == ColumnKind::deflection || kind == ColumnKind::cosine || kind == ColumnKind::sine;
 }
 bool of_nothing(ColumnKind kind) {
-  return kind == ColumnKind::temperature || kind == ColumnKind::clock;
+  return kind == ColumnKind::temperature || kind == ColumnKind::clock || kind == ColumnKind::bar;
 }
 
 int line_of(const KeyLines& lines, std::string_view key) {
@@ -225,6 +228,47 @@ void check_laps(const ImportMap& map, const std::string& name) {
   }
 }
 
+void check_bar(const ImportMap& map, const std::string& name) {
+  const auto is_bar = [](const ImportMap::Signal& s) { return s.kind == ColumnKind::bar; };
+  const auto is_deflection = [](const ImportMap::Signal& s) {
+    return s.kind == ColumnKind::deflection;
+  };
+  const auto column = std::find_if(map.signals.begin(), map.signals.end(), is_bar);
+  const Refusal refuse(name, "bar.", map.bar.lines);
+  if (column == map.signals.end()) {
+    if (map.bar.radius > 0) refuse("radius_mm", "no column is of kind bar");
+    if (!map.arcs.empty())
+      Refusal(name, "arcs.", map.arcs.front().lines)("", "no column is of kind bar");
+    return;
+  }
+  if (std::any_of(map.signals.begin(), map.signals.end(), is_deflection))
+    Refusal(name, "signals.", column->lines)(
+        "kind", "a probe was read as well; a record holds one or the other");
+  if (!(map.bar.radius > 0))
+    refuse("radius_mm", "is missing; a column of kind bar needs the nominal length of the bar");
+  if (!map.bar.lines.contains("centre_mm"))
+    refuse("centre_mm", "is missing; a column of kind bar needs where the circle's centre is");
+  if (map.arcs.empty()) return;
+  if (!(map.bar.feed > 0)) refuse("feed_mm_min", "is missing; arcs need their feed");
+  for (const ImportMap::Signal& s : map.signals)
+    if (!is_bar(s))
+      Refusal(name, "signals.", s.lines)(
+          "kind", fmt::format("with arcs the bar alone can be read, no {}; give the commands of "
+                              "the axes as columns instead of arcs",
+                              to_string(s.kind)));
+  if (!map.laps.empty())
+    Refusal(name, "laps.", map.laps.front().lines)("", "arcs say already which parts count");
+  double last = -HUGE_VAL;
+  for (const ImportMap::Arc& arc : map.arcs) {
+    const Refusal refuse_arc(name, "arcs.", arc.lines);
+    if (arc.from < last) refuse_arc("from_s", "the arc begins before the one above it ends");
+    if (std::abs(arc.sweep) < kLeastSweep)
+      refuse_arc("sweep_deg", fmt::format("{:g} is too short an arc; at least {:g}",
+                                          arc.sweep / kDegree, kLeastSweep / kDegree));
+    last = arc.from + std::abs(arc.sweep) * map.bar.radius / map.bar.feed;
+  }
+}
+
 void check_signal(const ImportMap& map, const ImportMap::Signal& s, const Refusal& refuse) {
   if (!s.column.empty() && s.number > 0)
     refuse("number", "column is given as well; one of them is too many");
@@ -232,8 +276,8 @@ void check_signal(const ImportMap& map, const ImportMap::Signal& s, const Refusa
   if (!s.lines.contains("kind"))
     refuse("kind",
            "is missing; allowed command, position, motor_position, load_position, twist, "
-           "velocity, force, applied_force, added_force, deflection, cosine, sine, temperature, "
-           "clock");
+           "velocity, force, applied_force, added_force, deflection, bar, cosine, sine, "
+           "temperature, clock");
   if (s.sign == 0) refuse("sign", "0 is not possible, allowed 1 or -1");
   if (s.scale == 0) refuse("scale", "0 would make every value the same");
   if (of_nothing(s.kind)) {
@@ -332,6 +376,8 @@ std::string_view to_string(ImportMap::Kind kind) {
       return "added_force";
     case ColumnKind::deflection:
       return "deflection";
+    case ColumnKind::bar:
+      return "bar";
     case ColumnKind::cosine:
       return "cosine";
     case ColumnKind::sine:
@@ -365,6 +411,7 @@ void check_import_map(const ImportMap& map, const std::string& name) {
   check_time(map, name);
   check_signals(map, name);
   check_laps(map, name);
+  check_bar(map, name);
 }
 
 }  // namespace vcnc

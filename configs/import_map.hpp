@@ -57,6 +57,7 @@ struct ImportMap {
     applied_force,   ///< known, on the load beside that of the drive
     added_force,     ///< known, added by the controller to its demand: part of force
     deflection,      ///< of the probe
+    bar,             ///< length of a ball bar less its nominal one
     cosine,          ///< raw signal of the probe or of an encoder
     sine,
     temperature,
@@ -125,6 +126,7 @@ struct ImportMap {
                     {"applied_force", Kind::applied_force},
                     {"added_force", Kind::added_force},
                     {"deflection", Kind::deflection},
+                    {"bar", Kind::bar},
                     {"cosine", Kind::cosine},
                     {"sine", Kind::sine},
                     {"temperature", Kind::temperature},
@@ -154,6 +156,45 @@ struct ImportMap {
     }
   };
 
+  /// A ball bar, and the circle it is read on.
+  struct Bar {
+    enum class Plane { XY, ZX, YZ };
+    Vec3 centre = Vec3::Zero();  ///< X, Y, Z of the machine at the circle's centre [m]
+    double radius = 0;           ///< nominal length [m]; 0: no bar
+    Plane plane = Plane::XY;
+    double feed = 0;  ///< of the arcs [m/s]
+    KeyLines lines;
+
+    template <class Self, class Visit>
+    static void fields(Self& p, Visit& visit) {
+      visit("centre_mm", p.centre, unit::mm, Range{-1e5, 1e5},
+            "machine coordinates X, Y, Z of the circle's centre");
+      visit("radius_mm", p.radius, unit::mm, Range{0, 1e4},
+            "nominal length of the bar, which is the radius of the circle; 0: no bar");
+      visit.choice("plane", p.plane, {{"XY", Plane::XY}, {"ZX", Plane::ZX}, {"YZ", Plane::YZ}},
+                   "of the arcs; angles count from its first axis to its second one");
+      visit("feed_mm_min", p.feed, unit::mm_min, Range{0, 1e6}, "of the arcs");
+      if constexpr (requires { visit.lines(p.lines); }) visit.lines(p.lines);
+    }
+  };
+
+  /// What a bar was read on, where no commands were recorded.
+  struct Arc {
+    double from = 0;         ///< [s] in the time of the table
+    double start = 0;        ///< angle [rad]
+    double sweep = 2 * kPi;  ///< negative: clockwise [rad]
+    KeyLines lines;
+
+    template <class Self, class Visit>
+    static void fields(Self& p, Visit& visit) {
+      visit("from_s", p.from, unit::s, Range{-1e12, 1e12}, "begin, in the time of the table");
+      visit("start_deg", p.start, unit::deg, Range{-3600, 3600}, "angle at which it begins");
+      visit("sweep_deg", p.sweep, unit::deg, Range{-36000, 36000},
+            "angle it covers; clockwise: negative");
+      if constexpr (requires { visit.lines(p.lines); }) visit.lines(p.lines);
+    }
+  };
+
   enum class Separator { any, comma, semicolon, tab, space };
   enum class Decimal { point, comma };
 
@@ -167,6 +208,8 @@ struct ImportMap {
   std::vector<Axis> axes;
   std::vector<Signal> signals;
   std::vector<Lap> laps;
+  Bar bar;
+  std::vector<Arc> arcs;
   KeyLines lines;
 
   template <class Self, class Visit>
@@ -191,6 +234,8 @@ struct ImportMap {
     visit.list("axes", p.axes, "names of the user's own for places of the machine file");
     visit.list("signals", p.signals, "the columns that count");
     visit.list("laps", p.laps, "the parts of the run that count");
+    visit.group("bar", p.bar, "where a ball bar was, for a column of kind bar");
+    visit.list("arcs", p.arcs, "what it was read on at constant feed, instead of commands");
     if constexpr (requires { visit.lines(p.lines); }) visit.lines(p.lines);
   }
 };

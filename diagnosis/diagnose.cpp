@@ -59,14 +59,14 @@ std::vector<double> left_by_commissioning(const Machine& declared,
   std::vector<double> left(channels.size(), 0.0);
   for (const CommissionedSignal& s : declared.commissioned) {
     bool known = false;
-    for (const SignalKind kind :
-         {SignalKind::position, SignalKind::twist, SignalKind::force, SignalKind::deflection})
+    for (const SignalKind kind : {SignalKind::position, SignalKind::twist, SignalKind::force,
+                                  SignalKind::deflection, SignalKind::bar})
       for (std::size_t axis = 0; axis < kAxisCount; ++axis)
         known = known || s.signal == signal_name(kind, axis);
     if (!known)
       throw InputError("commissioned.signal: \"" + s.signal +
                        "\" is none; allowed: position, twist or force of X, Y, Z, A or C, "
-                       "deflection of x, y or z");
+                       "deflection of x, y or z, ball bar");
     for (std::size_t c = 0; c < channels.size(); ++c)
       if (channel_name(channels[c]) == s.signal) left[c] = s.left;
   }
@@ -95,8 +95,10 @@ DiagnosisOptions fitting(DiagnosisOptions options, const Evidence& evidence,
     options.least_share = std::max(options.least_share, kShareOfChange);
     options.share_beside = std::max(options.share_beside, kShareBeside);
     options.form_of_channel = forms_of(evidence, *difference);
-    const auto off = [&](std::size_t c) { return difference->off_in({SignalKind::deflection, c}); };
-    options.form_um = 1e6 * kChangeOfForm * std::hypot(off(0), off(1), off(2));
+    double square = 0;
+    for (const ComparedChannel& c : evidence.replica().channels())
+      if (is_reading(c.kind)) square += std::pow(difference->off_in(c), 2);
+    options.form_um = 1e6 * kChangeOfForm * std::sqrt(square);
   } else if (!left.empty()) {
     allow_for_form(evidence, left, options);
   }

@@ -415,7 +415,7 @@ class Report {
   bool is_of_chatter(const NoiseLine& line) const {
     return std::any_of(before_.chatter.begin(), before_.chatter.end(), [&](const Chatter& c) {
       return c.has_line() &&
-             ((line.channel.axis == c.axis && line.channel.kind != SignalKind::deflection) ||
+             ((line.channel.axis == c.axis && !is_reading(line.channel.kind)) ||
               std::abs(line.frequency - c.line.frequency) < 0.02 * c.line.frequency);
     });
   }
@@ -481,7 +481,7 @@ class Report {
           });
       if (named || is_of_chatter(line)) continue;
       const bool mains = std::abs(line.frequency - 50) < 0.4 || std::abs(line.frequency - 60) < 0.4;
-      const bool probe = line.channel.kind == SignalKind::deflection;
+      const bool probe = is_reading(line.channel.kind);
       d_.notes.push_back(fmt::format(
           "{} holds a disturbance of {:.2f} Hz that does not repeat with the laps, amplitude "
           "{:.3g} {}, {:.0f} times the noise around it{}",
@@ -501,7 +501,7 @@ class Report {
     const Prediction left = evidence_.predict(d_.found);
     const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
     for (std::size_t c = 0; c < channels.size(); ++c) {
-      if (channels[c].kind != SignalKind::deflection) continue;
+      if (!is_reading(channels[c].kind)) continue;
       const double shift = shift_between_laps(evidence_, left, c).value_or(0),
                    noise = evidence_.noise().channels[c].rms;
       if (shift < kShifted * noise) continue;
@@ -560,7 +560,7 @@ class Report {
   /// Whether an axis that vibrates by itself moves a signal.
   bool is_stirred(const ComparedChannel& channel) const {
     return std::any_of(before_.chatter.begin(), before_.chatter.end(), [&](const Chatter& c) {
-      return channel.kind == SignalKind::deflection || channel.axis == c.axis;
+      return is_reading(channel.kind) || channel.axis == c.axis;
     });
   }
 
@@ -662,7 +662,7 @@ class Report {
     }
     double finest = std::numeric_limits<double>::infinity();  // slip of a period that would show
     for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
-      if (evidence_.replica().channels()[c].kind == SignalKind::deflection)
+      if (is_reading(evidence_.replica().channels()[c].kind))
         finest = std::min(finest, 5 * std::sqrt(2.0) * evidence_.noise().channels[c].rms /
                                       of_.declared.probe.signal_period);
     if (finest < 1) d_.excitation.push_back({"probe.period_slip", finest, true, "", ""});

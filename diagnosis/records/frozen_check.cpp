@@ -119,7 +119,7 @@ class FrozenSearch {
   }
 
  private:
-  bool is_reading() const { return signal_.kind == SignalKind::deflection; }
+  bool is_reading() const { return vcnc::is_reading(signal_.kind); }
 
   /// Whether the ball is moved: other readings say so, or it is far out.
   bool is_moved(const EqualRun& run) const {
@@ -159,7 +159,7 @@ std::string told(const MeasuredSignal& s, const EqualRun& run, const Record& rec
 void take_out_frozen(Record& record) {
   std::vector<std::vector<EqualRun>> all;
   for (const MeasuredSignal& s : record.signals)
-    all.push_back(s.kind == SignalKind::deflection || s.kind == SignalKind::force
+    all.push_back(is_reading(s.kind) || s.kind == SignalKind::force
                       ? FrozenSearch(record, s).frozen()
                       : std::vector<EqualRun>{});
   for (std::size_t i = 0; i < all.size(); ++i) {

@@ -10,6 +10,7 @@
 
 #include "configs/config.hpp"
 #include "configs/spelling.hpp"
+#include "diagnosis/records/bar_course.hpp"
 #include "diagnosis/records/position_jumps.hpp"
 #include "diagnosis/records/record_check.hpp"
 #include "diagnosis/records/signal_name.hpp"
@@ -21,6 +22,7 @@ namespace vcnc {
 namespace {
 
 constexpr std::size_t kShortestLap = 50;  // samples
+constexpr double kMostOfArc = 0.9;        // of its readings must be there
 
 using Kind = ImportMap::Kind;
 
@@ -50,7 +52,11 @@ class Importer {
           fmt::format("{}: {} samples are too short a run; at least {} are "
                       "needed",
                       table_.source, base_.samples, kFewestSamples));
-    for (const ImportMap::Signal& s : map_.signals) add(s);
+    if (map_.bar.radius > 0) record_.bar = {map_.bar.centre, map_.bar.radius};
+    if (map_.arcs.empty())
+      for (const ImportMap::Signal& s : map_.signals) add(s);
+    else
+      add_bar_on_arcs(map_.signals.front());
     add_twists();
     check_record(record_, velocities_, declared_);
     cut();
@@ -161,7 +167,7 @@ class Importer {
   }
 
   void tell_time() {
-    if (base_.gaps > 0)
+    if (base_.gaps > 0 && map_.arcs.empty())  // a bar is not read between its arcs
       warn(fmt::format("{} samples are missing in {} gap{} and stay missing", base_.lost,
                        base_.gaps, base_.gaps == 1 ? "" : "s"));
     if (base_.jitter > 0.01 * base_.period)
@@ -222,6 +228,9 @@ class Importer {
       case Kind::deflection:
         signal.kind = SignalKind::deflection;
         break;
+      case Kind::bar:
+        signal.kind = SignalKind::bar;
+        break;
       case Kind::cosine:
         signal.kind = SignalKind::cosine;
         break;
@@ -241,6 +250,60 @@ class Importer {
     if (signal.kind == SignalKind::position || signal.kind == SignalKind::command)
       check_jumps(column, s.kind);
     record_.signals.push_back(std::move(signal));
+  }
+
+  /// A bar and the commands of its arcs, on the time base of these.
+  void add_bar_on_arcs(const ImportMap::Signal& s) {
+    const ImportMap::Bar& bar = map_.bar;
+    std::vector<BarArc> arcs;
+    for (const ImportMap::Arc& a : map_.arcs) arcs.push_back({a.from, a.start, a.sweep});
+    std::vector<double> time;
+    for (const std::size_t index : base_.index)
+      time.push_back(base_.begin + static_cast<double>(index) * base_.period);
+    for (const ImportMap::Arc& a : map_.arcs) check_rows(a, time);
+    const BarCourse course = bar_course(arcs, bar.feed / bar.radius, time, base_.period);
+    if (course.later > base_.period)
+      warn(
+          fmt::format("the last arc comes {:.3g} s later than the table says: an axis must stop, "
+                      "turn round and be at its feed between two arcs",
+                      course.later));
+    record_.begin = course.begin;
+    MeasuredSignal length{SignalKind::bar, 0, columns_.front()->name,
+                          std::vector<double>(course.angle.size(), kMissing)};
+    for (std::size_t i = 0; i < rows_; ++i)
+      if (course.sample[i] != BarCourse::kNone)
+        length.value[course.sample[i]] = to_si(s, columns_.front()->value[i]);
+    using Plane = ImportMap::Bar::Plane;
+    const std::size_t one = bar.plane == Plane::ZX   ? kZ
+                            : bar.plane == Plane::YZ ? kY
+                                                     : kX,
+                      other = bar.plane == Plane::ZX   ? kX
+                              : bar.plane == Plane::YZ ? kZ
+                                                       : kY;
+    for (const std::size_t axis : {kX, kY, kZ}) {
+      MeasuredSignal command{SignalKind::command, axis, "arcs", {}};
+      for (const double angle : course.angle)
+        command.value.push_back(bar.centre[static_cast<Eigen::Index>(axis)] +
+                                (axis == one     ? bar.radius * std::cos(angle)
+                                 : axis == other ? bar.radius * std::sin(angle)
+                                                 : 0));
+      record_.signals.push_back(std::move(command));
+    }
+    record_.signals.push_back(std::move(length));
+  }
+
+  /// An arc without readings is a mistake in its time.
+  void check_rows(const ImportMap::Arc& arc, const std::vector<double>& time) const {
+    const double to = arc.from + std::abs(arc.sweep) * map_.bar.radius / map_.bar.feed;
+    const auto from = std::lower_bound(time.begin(), time.end(), arc.from - 1e-9),
+               end = std::upper_bound(time.begin(), time.end(), to + 1e-9);
+    const double expected = (to - arc.from) / base_.period, there = static_cast<double>(end - from);
+    if (there < kMostOfArc * expected)
+      refuse(
+          arc.lines, "arcs.", "from_s",
+          fmt::format("from {:.3f} to {:.3f} s there are {:.0f} of {:.0f} readings; check times, "
+                      "angles, radius and feed",
+                      arc.from, to, there, expected));
   }
 
   void check_jumps(const MeasuredColumn& c, Kind kind) const {

@@ -10,10 +10,12 @@
 
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "model/machine.hpp"
+#include "model/math.hpp"
 #include "model/piece_params.hpp"
 
 namespace vcnc {
@@ -27,16 +29,30 @@ enum class SignalKind {
   applied_force,  ///< known force on the load beside that of its drive [N or N m]
   added_force,    ///< known part of the drive's force that its loops did not ask for [N or N m]
   deflection,     ///< of the probe, one component in the probe's frame [m]
+  bar,            ///< length of a ball bar less its nominal one [m]
   cosine,         ///< raw signal of one probe channel or encoder [V, or share of the converter]
   sine,           ///< as cosine
   temperature,    ///< [K]
   clock           ///< time stamps of the device that measured, where it has a clock of its own [s]
 };
 
+/// Whether it says where the tool is against the piece.
+constexpr bool is_reading(SignalKind q) {
+  return q == SignalKind::deflection || q == SignalKind::bar;
+}
+
 constexpr bool is_compared(SignalKind q) {
   return q == SignalKind::position || q == SignalKind::twist || q == SignalKind::force ||
-         q == SignalKind::deflection;
+         is_reading(q);
 }
+
+/// A ball bar: a ball on the table and one in the spindle, and what measures their distance.
+struct BallBar {
+  Vec3 centre = Vec3::Zero();  ///< X, Y, Z at which one ball would be in the other [m]
+  double length = 0;           ///< nominal distance [m]
+
+  bool operator==(const BallBar&) const = default;
+};
 
 /// One signal of a record.
 struct MeasuredSignal {
@@ -63,8 +79,9 @@ struct Record {
   std::vector<Stretch> stretches;     ///< in order of time, not overlapping
   std::vector<std::string> warnings;  ///< one sentence each
 
-  std::string machine_toml;  ///< declared machine told by the run itself; empty: none
-  std::string piece_toml;    ///< piece in the machine; empty: none
+  std::string machine_toml;    ///< declared machine told by the run itself; empty: none
+  std::string piece_toml;      ///< piece in the machine; empty: none
+  std::optional<BallBar> bar;  ///< where a bar was read; else a probe on the piece
 
   std::size_t samples() const { return signals.empty() ? 0 : signals.front().value.size(); }
   /// Null where there is none.

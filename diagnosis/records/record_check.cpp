@@ -221,7 +221,8 @@ class Checker {
       const bool raw = s.kind == SignalKind::cosine || s.kind == SignalKind::sine;
       if (is_compared(s.kind) || raw) ++compared, still += is_constant;
       const bool told = s.kind == SignalKind::applied_force || s.kind == SignalKind::added_force;
-      if (is_constant && s.kind != SignalKind::temperature && !told)
+      const bool stands = record_.bar && s.kind == SignalKind::command;  // across the bar's plane
+      if (is_constant && s.kind != SignalKind::temperature && !told && !stands)
         warn(fmt::format("{} is constant; nothing can be learnt from it", name(s)));
       if (told && !record_.find(SignalKind::command, s.axis) && !is_followed(record_, s.axis))
         warn(fmt::format("{} is not used: no command of {} is known", name(s), kAxisNames[s.axis]));
@@ -235,7 +236,7 @@ class Checker {
       if (steps < kFewestSteps && s.kind != SignalKind::temperature && !told)
         warn(fmt::format("{} comes in {:.0f} coarse steps of {:.3g} (SI)", name(s), steps,
                          s.resolution));
-      if (s.kind == SignalKind::force || s.kind == SignalKind::deflection || raw) check_ends(s);
+      if (s.kind == SignalKind::force || is_reading(s.kind) || raw) check_ends(s);
       if (!raw && s.kind != SignalKind::temperature && s.kind != SignalKind::clock)
         check_lone(s), check_filler(s);
     }
@@ -257,7 +258,7 @@ class Checker {
   void check_poses() {
     const auto known = [&](std::size_t axis) { return motion(axis) != nullptr; };
     if (std::none_of(record_.signals.begin(), record_.signals.end(),
-                     [](const MeasuredSignal& s) { return s.kind == SignalKind::deflection; }) ||
+                     [](const MeasuredSignal& s) { return is_reading(s.kind); }) ||
         (known(kX) && known(kY) && known(kZ)))
       return;
     std::string missing;

@@ -37,6 +37,20 @@ bool write_signal(hid_t file, std::size_t i, const MeasuredSignal& s) {
          H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, s.value.data()) >= 0;
 }
 
+bool write_bar(hid_t file, const std::optional<BallBar>& bar) {
+  return !bar ||
+         (write(file, "bar_length_m", bar->length) && write(file, "bar_x_m", bar->centre.x()) &&
+          write(file, "bar_y_m", bar->centre.y()) && write(file, "bar_z_m", bar->centre.z()));
+}
+
+std::optional<BallBar> read_bar(hid_t file) {
+  BallBar bar;
+  const bool there = read(file, "bar_length_m", bar.length) &&
+                     read(file, "bar_x_m", bar.centre.x()) &&
+                     read(file, "bar_y_m", bar.centre.y()) && read(file, "bar_z_m", bar.centre.z());
+  return there ? std::optional(bar) : std::nullopt;
+}
+
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
@@ -102,7 +116,8 @@ void write_record(const Record& record, const std::filesystem::path& path) {
               write(file, "begin_s", record.begin) &&
               write(file, "machine_toml", record.machine_toml) &&
               write(file, "piece_toml", record.piece_toml) &&
-              write(file, "stretches", stretches_text(record)) && write(file, "warnings", warnings);
+              write(file, "stretches", stretches_text(record)) &&
+              write(file, "warnings", warnings) && write_bar(file, record.bar);
     for (std::size_t i = 0; written && i < record.signals.size(); ++i)
       written = write_signal(file, i, record.signals[i]);
     written = H5Fclose(file.release()) >= 0 && written;
@@ -141,7 +156,10 @@ Record read_record(const std::filesystem::path& path) {
     sound = read_signal(file, static_cast<std::size_t>(i), record.signals.emplace_back(), size);
     sound = sound && record.signals.back().value.size() == record.samples();
   }
-  if (!sound || !read_stretches(stretches, record)) refuse(path, "the record is damaged");
+  record.bar = read_bar(file);
+  const bool has_bar = record.find(SignalKind::bar, 0) != nullptr;
+  if (!sound || has_bar != record.bar.has_value() || !read_stretches(stretches, record))
+    refuse(path, "the record is damaged");
   std::istringstream lines(warnings);
   for (std::string line; std::getline(lines, line);) record.warnings.push_back(line);
   return record;

@@ -7,7 +7,7 @@ namespace vcnc {
 
 namespace {
 
-constexpr std::array<std::pair<SignalKind, std::string_view>, 11> kKindNames{{
+constexpr std::array<std::pair<SignalKind, std::string_view>, 12> kKindNames{{
     {SignalKind::command, "command"},
     {SignalKind::position, "position"},
     {SignalKind::twist, "twist"},
@@ -15,6 +15,7 @@ constexpr std::array<std::pair<SignalKind, std::string_view>, 11> kKindNames{{
     {SignalKind::applied_force, "applied force"},
     {SignalKind::added_force, "added force"},
     {SignalKind::deflection, "deflection"},
+    {SignalKind::bar, "ball bar"},
     {SignalKind::cosine, "cosine"},
     {SignalKind::sine, "sine"},
     {SignalKind::temperature, "temperature"},
@@ -36,7 +37,7 @@ std::optional<SignalKind> signal_kind(std::string_view name) {
 }
 
 std::string signal_name(SignalKind kind, std::size_t axis) {
-  if (kind == SignalKind::temperature || kind == SignalKind::clock)
+  if (kind == SignalKind::temperature || kind == SignalKind::clock || kind == SignalKind::bar)
     return std::string(to_string(kind));
   const bool probe =
       kind == SignalKind::deflection || kind == SignalKind::cosine || kind == SignalKind::sine;

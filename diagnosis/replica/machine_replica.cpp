@@ -18,6 +18,7 @@ namespace {
 constexpr double kCycleTime = 1e-3;     // [s]
 constexpr double kUnknownForce = 0.05;  // standard deviation, of a force that a healthy run tells
 constexpr std::size_t kSlowly = 50;     // of a mean to either side [cycles]
+constexpr double kStill = 1e-4;         // an axis across the plane of a bar moves by less [m]
 constexpr std::size_t kAxisReplays = 6, kWatched = 1, kPoses = 4, kBalls = 8;
 
 /// The commands at 1 ms.
@@ -68,8 +69,7 @@ std::vector<ComparedChannel> channels_of(const Record& record, const CommandedMo
   for (const MeasuredSignal& signal : record.signals) {
     if (!is_compared(signal.kind)) continue;
     if (signal.kind == SignalKind::position && motion.followed[signal.axis]) continue;
-    if (signal.kind == SignalKind::deflection ||
-        motion.told[signal.axis] == CommandedMotion::Told::command)
+    if (is_reading(signal.kind) || motion.told[signal.axis] == CommandedMotion::Told::command)
       channels.push_back({signal.kind, signal.axis});
   }
   return channels;
@@ -172,13 +172,16 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
   const CommandedMotion motion = commanded_motion(record);
   channels_ = channels_of(record, motion);
   probes_ = std::any_of(channels_.begin(), channels_.end(),
-                        [](const ComparedChannel& c) { return c.kind == SignalKind::deflection; });
+                        [](const ComparedChannel& c) { return is_reading(c.kind); });
   known_ = motion.known;
   motion_ = at_cycles(motion, period_);
   for (std::size_t c = 0; c < measured_.size(); ++c)
-    if (const MeasuredSignal* signal = record.find(SignalKind::deflection, c))
+    if (const MeasuredSignal* signal =
+            record.find(record.bar ? SignalKind::bar : SignalKind::deflection, c))
       measured_[c] = at_cycles(signal->value, period_, motion_.known.size());
   if (piece) piece_ = make_piece(*piece);
+  against_.piece = piece_.get();
+  if (record.bar) hold_against(*record.bar);
   for (auto& memory : axis_memory_) memory = std::make_unique<Memory<AxisReplay>>(kAxisReplays);
   for (auto& memory : watched_) memory = std::make_unique<Memory<WatchedReplay>>(kWatched);
   pose_memory_ = std::make_unique<Memory<Poses>>(kPoses);
@@ -187,6 +190,27 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
 }
 
 MachineReplica::~MachineReplica() = default;
+
+/// The ball on the table is where the tool is when the axes bring one ball into the other, the
+/// rotary ones as they begin.
+void MachineReplica::hold_against(const BallBar& bar) {
+  AxisVector stands;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    stands[axis] = declared_.axes[axis].limits.start;
+  AxisVector q = motion_.start(stands);
+  std::vector<std::size_t> still;
+  for (const std::size_t axis : {kX, kY, kZ}) {
+    q[axis] = bar.centre[static_cast<Eigen::Index>(axis)];
+    const std::vector<double>& x = motion_.position[axis];
+    const auto [low, high] = std::minmax_element(x.begin(), x.end());
+    if (x.empty() || *high - *low < kStill) still.push_back(axis);
+  }
+  const Kinematics kinematics(declared_.kinematics, declared_.probe.length,
+                              declared_.setup.work_offset[0]);
+  against_.bar = {kinematics.forward(q).p_WT, bar.length};
+  if (still.size() == 1)
+    across_ = kinematics.jacobian(q).col(static_cast<Eigen::Index>(still.front())).normalized();
+}
 
 bool MachineReplica::knows_forces() const {
   return std::any_of(motion_.unknown.begin(), motion_.unknown.end(),
@@ -235,6 +259,11 @@ MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine,
     const bool unseen = is_of_loops<Effect>() && axis < kAxisCount && motion_.followed[axis];
     if ((is_chance<Effect>() && !stays) || unseen) effect = Effect();
   });
+  if (!across_.isZero()) {
+    Vec3& shift = h.machine.effects.get<PieceOffset>().shift;
+    shift -= across_ * across_.dot(shift);
+    h.machine.effects.get<PieceTilt>() = {};
+  }
   h.actual = vcnc::actual(h.machine);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     if (motion_.followed[axis])
@@ -289,10 +318,10 @@ std::shared_ptr<const Deflections> MachineReplica::ball_of(const Hypothesis& h,
   return ball_memory_->find_or_make(h.ball, [&] {
     if (h.contact != anchor_->contact && poses_follow_dynamics(h.actual)) {
       const Poses poses = replay_poses(h.actual, axes);
-      return replay_contact(h.actual, piece_.get(), {anchor_->poses, poses, anchor_->poses.axes()});
+      return replay_contact(h.actual, against_, {anchor_->poses, poses, anchor_->poses.axes()});
     }
     const auto poses = poses_of(h);
-    return replay_contact(h.actual, piece_.get(), {anchor_->poses, *poses, axes});
+    return replay_contact(h.actual, against_, {anchor_->poses, *poses, axes});
   });
 }
 
@@ -310,11 +339,11 @@ bool MachineReplica::anchor(const Machine& machine) {
   Deflections quick;
   parallel_for(2, [&](std::size_t i) {
     if (i == 0) {
-      full = replay_probe(h.actual, piece_.get(), axes);
+      full = replay_probe(h.actual, against_, axes);
       return;
     }
     anchor = std::make_unique<Anchor>(h, axes);
-    quick = replay_contact(h.actual, piece_.get(),
+    quick = replay_contact(h.actual, against_,
                            {anchor->poses, anchor->poses.poses(), anchor->poses.axes()});
   });
   anchor->off_record = off_record(full.reading);
@@ -334,7 +363,7 @@ bool MachineReplica::anchor(const Machine& machine) {
 
 Deflections MachineReplica::reading_of(const Hypothesis& h, const AxisReplays& axes) const {
   if (h.ball == anchor_->ball && h.sensing == anchor_->sensing) return anchor_->reading;
-  if (anchor_->needs_full(h)) return replay_probe(h.actual, piece_.get(), axes).reading;
+  if (anchor_->needs_full(h)) return replay_probe(h.actual, against_, axes).reading;
   const Deflections ball = sum(*ball_of(h, axes), anchor_->ball_offset, 1);
   // Where in their period the signals are is known from the record, wherever the ball is held to
   // be.
@@ -523,8 +552,7 @@ Prediction MachineReplica::predict_in_full(const Machine& machine) const {
   AxisReplays axes;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     axes[axis] = std::make_shared<AxisReplay>(replayed(h, axis));
-  return assembled(axes,
-                   probes_ ? replay_probe(h.actual, piece_.get(), axes).reading : Deflections{});
+  return assembled(axes, probes_ ? replay_probe(h.actual, against_, axes).reading : Deflections{});
 }
 
 }  // namespace vcnc

@@ -23,6 +23,9 @@
 // moved along with the axes to first order. So it is exact at the anchor, and the nearer the
 // better. What cannot be had quickly is computed in full.
 //
+// A bar that stays in a plane is held to be set up in it: what shifts or tilts it out of that, it
+// shows by its square alone, and a fit by sensitivities would go astray.
+//
 // Errors of the signals repeat with every few micrometres of deflection, and where the ball is, the
 // model may not know to one. They are therefore taken where the record says it was: moved by what
 // the record is off the anchor's reading, as a mean over 10 ms before and after.
@@ -88,6 +91,7 @@ class MachineReplica : public Replica {
   AxisReplay replayed(const Hypothesis& hypothesis, std::size_t axis) const;
   void sample_as_recorded(AxisReplay& replay) const;
   Prediction predict(const Hypothesis& hypothesis, const AxisReplays& axes) const;
+  void hold_against(const BallBar& bar);
   bool knows_forces() const;  ///< of some axis, by apply()
   Prediction assembled(const AxisReplays& axes, const Deflections& reading) const;
   Deflections off_record(const Deflections& reading) const;
@@ -97,11 +101,13 @@ class MachineReplica : public Replica {
   double period_;
   std::size_t samples_;
   std::vector<ComparedChannel> channels_;
-  bool probes_ = false;      ///< some channel is a deflection
+  bool probes_ = false;      ///< some channel is a reading
   CommandedMotion motion_;   ///< at 1 ms
   std::vector<char> known_;  ///< at the record's rate
   Deflections measured_;     ///< at 1 ms; empty where not recorded
   std::unique_ptr<Piece> piece_;
+  Counterpart against_;
+  Vec3 across_ = Vec3::Zero();  ///< unit normal of the plane that a bar stays in; zero: none
   PerAxis<std::unique_ptr<Memory<AxisReplay>>> axis_memory_;
   PerAxis<std::unique_ptr<Memory<WatchedReplay>>> watched_;
   std::unique_ptr<Memory<Poses>> pose_memory_;  ///< on the anchor's axes

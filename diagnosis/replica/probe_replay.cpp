@@ -134,6 +134,21 @@ class CoarseContact {
   double clearance_ = 0;
 };
 
+/// What a bar reads, in the first channel.
+template <class PosesOfCycles>
+Deflections bar_readings(const Machine& actual, const Counterpart::Bar& bar, PosesOfCycles& poses) {
+  Chain<TouchPort> effects = machine_chain<TouchPort>(actual.effects, kProbeSeed);
+  Deflections reading;
+  for (std::vector<double>& r : reading) r.assign(poses.size(), 0.0);
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    TouchPort::Signal<double> ball{.radius = actual.probe.ball_radius};
+    effects.step(ball, {.moment = moment_of(k)});  // its balls are held, not felt on one side
+    const double distance = (poses[k].p_WT - bar.p_WB).norm();
+    reading[0][k] = distance - bar.length + ball.radius - actual.probe.ball_radius;
+  }
+  return reading;
+}
+
 bool corrects_signals(const Machine& actual) {
   return actual.probe.correction == ProbeParams::Correction::heydemann;
 }
@@ -192,14 +207,21 @@ void add_effects(Fingerprint& print, const Machine& actual, EffectStage stage) {
 
 }  // namespace
 
-ProbeReplay replay_probe(const Machine& actual, const Piece* piece, const AxisReplays& axes) {
+ProbeReplay replay_probe(const Machine& actual, const Counterpart& against,
+                         const AxisReplays& axes) {
+  if (against.bar) {
+    const Poses poses = replay_poses(actual, axes);
+    ProbeReplay replay{bar_readings(actual, *against.bar, poses), {}};
+    replay.reading = replay_sensing(actual, replay.ball, axes);
+    return replay;
+  }
   const std::size_t samples = axes[0]->truth.size(), cycles = samples / kTruthPerCycle;
   ProbeReplay replay;
   for (std::size_t c = 0; c < 3; ++c) {
     replay.ball[c].resize(cycles);
     replay.reading[c].resize(cycles);
   }
-  ProbeSensor sensor(actual, piece, kProbeSeed);
+  ProbeSensor sensor(actual, against.piece, kProbeSeed);
   for (std::size_t s = kTruthPerCycle - 1; s < samples; ++s) {  // the first is that of instant 0
     AxisVector q;
     for (std::size_t i = 0; i < kAxisCount; ++i) q[i] = axes[i]->truth[s];
@@ -274,10 +296,12 @@ const ToolPose& NearbyPoses::Course::operator[](std::size_t k) {
   return pose_;
 }
 
-Deflections replay_contact(const Machine& actual, const Piece* piece, NearbyPoses::Course poses) {
+Deflections replay_contact(const Machine& actual, const Counterpart& against,
+                           NearbyPoses::Course poses) {
+  if (against.bar) return bar_readings(actual, *against.bar, poses);
   Deflections ball;
   for (std::vector<double>& b : ball) b.resize(poses.size());
-  CoarseContact contact(actual, piece);
+  CoarseContact contact(actual, against.piece);
   for (std::size_t k = 0; k < poses.size(); ++k) {
     const Vec3 deflection = contact.step(poses[k], k);
     for (std::size_t c = 0; c < 3; ++c) ball[c][k] = deflection[static_cast<Eigen::Index>(c)];

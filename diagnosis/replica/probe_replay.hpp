@@ -16,6 +16,13 @@
 // converter and without counting: nothing slips. Where signals are corrected online, the
 // correction sees its samples of 100 us on straight lines between cycles, until it has its ellipse.
 //
+// A ball bar in place of the probe has no motion of its own: its reading, in the first channel, is
+//
+//   d = |p_WT - p_WB| - L + r_b - r_0
+//
+// p_WB the ball on the table, L the nominal length, r_b - r_0 what the ball is larger than declared
+// (TouchPort), which for a bar is the error of its zero. Then it is sensed like a deflection.
+//
 // Neglected against the full probe: motion of the tool within 1 ms other than even, quantisation by
 // the converter (0.13 nm), and what only fingerprint_of_full_probe() names. What is left cancels in
 // the difference to first order.
@@ -23,6 +30,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,13 +45,24 @@ using AxisReplays = PerAxis<std::shared_ptr<const AxisReplay>>;
 /// x, y, z in the probe frame, one value per cycle [m].
 using Deflections = std::array<std::vector<double>, 3>;
 
+/// What the tool is held against: a piece by a probe, or the ball on the table by a bar.
+struct Counterpart {
+  struct Bar {
+    Vec3 p_WB = Vec3::Zero();  ///< the ball on the table [m]
+    double length = 0;         ///< nominal [m]
+  };
+  const Piece* piece = nullptr;  ///< null: nothing is touched
+  std::optional<Bar> bar;
+};
+
 struct ProbeReplay {
   Deflections ball;     ///< the true deflection
   Deflections reading;  ///< what the module makes of it
 };
 
-/// In full. `actual` is a hypothesis with its deviations applied; `piece` may be null.
-ProbeReplay replay_probe(const Machine& actual, const Piece* piece, const AxisReplays& axes);
+/// In full. `actual` is a hypothesis with its deviations applied.
+ProbeReplay replay_probe(const Machine& actual, const Counterpart& against,
+                         const AxisReplays& axes);
 
 /// Poses of the tool at the end of every cycle.
 using Poses = std::vector<ToolPose>;
@@ -89,7 +108,8 @@ class NearbyPoses {
 };
 
 /// Quickly: the true deflection of the ball.
-Deflections replay_contact(const Machine& actual, const Piece* piece, NearbyPoses::Course poses);
+Deflections replay_contact(const Machine& actual, const Counterpart& against,
+                           NearbyPoses::Course poses);
 /// Quickly: what the probe says of it, with the errors of its signals taken where the ball is moved
 /// by `moved`; null: where it is.
 Deflections replay_sensing(const Machine& actual, const Deflections& ball, const AxisReplays& axes,

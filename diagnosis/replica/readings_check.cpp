@@ -86,11 +86,11 @@ void check_readings(const Record& record, const std::vector<ComparedChannel>& ch
   for (std::size_t c = 0; c < channels.size(); ++c) {
     const auto& [kind, axis] = channels[c];
     const MeasuredSignal* s = record.find(kind, axis);
-    if (!s || (kind != SignalKind::deflection && kind != SignalKind::twist)) continue;
+    if (!s || (!is_reading(kind) && kind != SignalKind::twist)) continue;
     if (correlation(s->value, predicted[c]) < -kIs)
       throw MeasurementError(fmt::format(
           "{}: {} goes against what the machine does; check its sign", record.source, name(*s)));
-    if (kind == SignalKind::deflection) readings.push_back({s, predicted[c]});
+    if (is_reading(kind)) readings.push_back({s, predicted[c]});
   }
   const auto alike = [](const Reading& read, const Reading& as) {
     return correlation(read.measured->value, as.predicted);

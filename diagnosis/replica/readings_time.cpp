@@ -188,7 +188,7 @@ std::vector<std::string> check_reading_times(const Record& record, const Machine
       measured = measured && position;
       return position;
     }
-    return s.kind != SignalKind::position && s.kind != SignalKind::deflection;
+    return s.kind != SignalKind::position && !is_reading(s.kind);
   });
   const MachineReplica replica(moved, declared, piece);
   std::vector<const MeasuredSignal*> readings;
@@ -196,7 +196,7 @@ std::vector<std::string> check_reading_times(const Record& record, const Machine
   const Prediction all = replica.predict(declared);
   for (std::size_t c = 0; c < all.size(); ++c) {
     const auto& [kind, axis] = replica.channels()[c];
-    if (kind != SignalKind::deflection) continue;
+    if (!is_reading(kind)) continue;
     readings.push_back(record.find(kind, axis));
     predicted.push_back(all[c]);
   }

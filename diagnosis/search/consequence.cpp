@@ -28,12 +28,12 @@ Difference difference(const Evidence& evidence, const Prediction& a, const Predi
 Consequence consequence(const Evidence& evidence, const Prediction& a, const Prediction& b) {
   const std::vector<ComparedChannel>& channels = evidence.replica().channels();
   const bool probed = std::any_of(channels.begin(), channels.end(),
-                                  [](const auto& c) { return c.kind == SignalKind::deflection; });
+                                  [](const auto& c) { return is_reading(c.kind); });
   Consequence of;
   double sum = 0, n = 0;  // of the contour
   for (std::size_t c = 0; c < channels.size(); ++c) {
     const Difference d = difference(evidence, a, b, c);
-    const bool reading = channels[c].kind == SignalKind::deflection;
+    const bool reading = is_reading(channels[c].kind);
     const bool contour =
         probed ? reading : channels[c].kind == SignalKind::position && !is_rotary(channels[c].axis);
     if (contour) {

@@ -91,7 +91,7 @@ std::optional<Confirmation> ControllerCheck::of(std::size_t axis, const Predicti
   if (!(mean_square(d) > kLeastShare * kLeastShare * mean_square(moved))) return std::nullopt;
   SeriesOfChannels left(channels_.size());
   for (std::size_t c = 0; c < channels_.size(); ++c) {
-    if (channels_[c].axis != axis || channels_[c].kind == SignalKind::deflection) continue;
+    if (channels_[c].axis != axis || is_reading(channels_[c].kind)) continue;
     left[c] = record_.find(channels_[c].kind, axis)->value;
     for (std::size_t k = 0; k < left[c].size(); ++k) left[c][k] -= with[c][k];
   }

@@ -82,7 +82,7 @@ std::vector<std::pair<ComparedChannel, double>> leave_out_untold(Record& differe
                                                                  const Record& now) {
   std::vector<std::pair<ComparedChannel, double>> off;
   for (MeasuredSignal& signal : difference.signals) {
-    if (signal.kind != SignalKind::deflection) continue;
+    if (!is_reading(signal.kind)) continue;
     const std::vector<double>& measured = now.find(signal.kind, signal.axis)->value;
     std::vector<double> wrong(measured.size());
     for (std::size_t k = 0; k < wrong.size(); ++k) wrong[k] = measured[k] - signal.value[k];
@@ -114,7 +114,7 @@ void add_left_of_forces(const Record& now, DifferentialRecord& difference,
     const MeasuredSignal *was = now.find(healthy.channels[c].kind, healthy.channels[c].axis),
                          *is = difference.record.find(healthy.channels[c].kind,
                                                       healthy.channels[c].axis);
-    if (!was || healthy.channels[c].kind == SignalKind::deflection) continue;
+    if (!was || is_reading(healthy.channels[c].kind)) continue;
     for (std::size_t k = 0; k < was->value.size(); ++k)
       off[c].push_back(was->value[k] - is->value[k]);
   }
@@ -136,7 +136,7 @@ Record without_outliers(Record record, const Replica& replica, const Machine& de
   const Prediction predicted = replica.predict(declared);
   for (std::size_t c = 0; c < predicted.size(); ++c) {
     const ComparedChannel& channel = replica.channels()[c];
-    if (channel.kind != SignalKind::deflection) continue;
+    if (!is_reading(channel.kind)) continue;
     for (MeasuredSignal& signal : record.signals) {
       if (signal.kind != channel.kind || signal.axis != channel.axis) continue;
       std::vector<double> off(signal.value.size());
@@ -215,7 +215,7 @@ std::vector<double> in_laps_of(const Record& now, const HealthyRun& healthy,
 bool unlike(const std::vector<LapEvent>& events, const MeasuredSignal& signal, std::size_t sample) {
   return std::any_of(events.begin(), events.end(), [&](const LapEvent& e) {
     return e.begin <= sample && sample < e.end &&
-           (signal.kind == SignalKind::deflection || signal.axis == e.axis);
+           (is_reading(signal.kind) || signal.axis == e.axis);
   });
 }
 

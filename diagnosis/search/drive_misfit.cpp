@@ -35,8 +35,7 @@ bool has(const Replica& replica, SignalKind kind, std::size_t axis) {
 }  // namespace
 
 Record of_drives(Record record) {
-  std::erase_if(record.signals,
-                [](const MeasuredSignal& s) { return s.kind == SignalKind::deflection; });
+  std::erase_if(record.signals, [](const MeasuredSignal& s) { return is_reading(s.kind); });
   return record;
 }
 

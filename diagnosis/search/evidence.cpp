@@ -206,8 +206,8 @@ bool Evidence::underrates_rounding(const Machine& machine) const {
   if (rms_of_rounding_.empty()) return false;
   const std::vector<double> now = rms_of_all(rounding_of(machine));
   for (std::size_t c = 0; c < now.size(); ++c)
-    if (replica_.channels()[c].kind == SignalKind::deflection &&
-        now[c] > kUnderrated * rms_of_rounding_[c] && now[c] > noise_.channels[c].rms)
+    if (is_reading(replica_.channels()[c].kind) && now[c] > kUnderrated * rms_of_rounding_[c] &&
+        now[c] > noise_.channels[c].rms)
       return true;
   return false;
 }
@@ -230,7 +230,7 @@ void Evidence::leave_out(const std::vector<LapEvent>& events) {
   for (const LapEvent& e : events)
     for (std::size_t c = 0; c < raw_valid_.size(); ++c) {
       const ComparedChannel& channel = replica_.channels()[c];
-      if (channel.kind == SignalKind::deflection || channel.axis == e.axis)
+      if (is_reading(channel.kind) || channel.axis == e.axis)
         std::fill(raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(e.begin),
                   raw_valid_[c].begin() + static_cast<std::ptrdiff_t>(e.end), 0);
     }
@@ -288,7 +288,7 @@ std::vector<Column::Channels> Evidence::whitened_shifts(const Eigen::Vector3d& s
 void Evidence::leave_out_drive(std::size_t axis) {
   for (std::size_t c = 0; c < valid_.size(); ++c) {
     const ComparedChannel& channel = replica_.channels()[c];
-    if (channel.axis != axis || channel.kind == SignalKind::deflection) continue;
+    if (channel.axis != axis || is_reading(channel.kind)) continue;
     std::fill(valid_[c].begin(), valid_[c].end(), 0);
     fitted_count_[c] = held_out_count_[c] = 0;
   }
@@ -297,13 +297,13 @@ void Evidence::leave_out_drive(std::size_t axis) {
 std::vector<SeriesOfChannels> Evidence::readings_per_shift(
     const std::vector<Machine>& shifted) const {
   const std::vector<ComparedChannel>& channels = replica_.channels();
-  const auto is_reading = [](const ComparedChannel& c) { return c.kind == SignalKind::deflection; };
-  if (std::none_of(channels.begin(), channels.end(), is_reading)) return {};
+  const auto reads = [](const ComparedChannel& c) { return is_reading(c.kind); };
+  if (std::none_of(channels.begin(), channels.end(), reads)) return {};
   std::vector<SeriesOfChannels> all;
   for (const Prediction& answer : predict_all(shifted)) {
     SeriesOfChannels& change = all.emplace_back(channels.size());
     for (std::size_t c = 0; c < channels.size(); ++c)
-      for (std::size_t k = 0; is_reading(channels[c]) && k < record_.samples(); ++k)
+      for (std::size_t k = 0; reads(channels[c]) && k < record_.samples(); ++k)
         change[c].push_back((answer[c][k] - declared_[c][k]) / kShift);
     mask(change);
   }

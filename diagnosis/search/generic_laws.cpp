@@ -145,7 +145,7 @@ class Laws {
   bool is_read(std::size_t component) const {
     const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
     return std::any_of(channels.begin(), channels.end(), [&](const ComparedChannel& c) {
-      return c.kind == SignalKind::deflection && c.axis == component;
+      return is_reading(c.kind) && c.axis == component;
     });
   }
 
@@ -244,9 +244,9 @@ class Laws {
     const auto length = static_cast<std::size_t>(std::round(0.3 / period_));
     const auto lead = static_cast<std::size_t>(std::round(kPulse / period_));
     for (std::size_t c = 0; c < channels.size(); ++c) {
-      r.through_motion.push_back(channels[c].kind == SignalKind::deflection);
+      r.through_motion.push_back(is_reading(channels[c].kind));
       Series h;
-      const bool own = channels[c].axis == i && channels[c].kind != SignalKind::deflection;
+      const bool own = channels[c].axis == i && !is_reading(channels[c].kind);
       for (std::size_t k = 0; own && k < length && fastest + k < v.size() + lead; ++k) {
         if (fastest + k < lead) continue;
         h.push_back(answer[c][fastest + k - lead]);
@@ -298,8 +298,7 @@ class Laws {
     SeriesOfChannels p(channels.size());
     if (law.point == Law::Point::reading) {
       for (std::size_t c = 0; c < channels.size(); ++c)
-        if (channels[c].kind == SignalKind::deflection && channels[c].axis == law.axis_index())
-          p[c] = y;
+        if (is_reading(channels[c].kind) && channels[c].axis == law.axis_index()) p[c] = y;
       return p;
     }
     Series motion = y;

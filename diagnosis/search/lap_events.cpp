@@ -161,7 +161,7 @@ std::vector<LapEvent> lap_events(const Partition& partition, double period,
   const auto reach = static_cast<std::size_t>(std::round(kEventReach / period));
   std::vector<LapEvent> all;
   for (std::size_t c = 0; c < channels.size(); ++c) {
-    if (channels[c].kind == SignalKind::deflection) continue;
+    if (is_reading(channels[c].kind)) continue;
     const std::vector<Repeated> laps = repeated(partition, difference[c]);
     for (const auto& found : {events_of_all(channels[c], laps, reach),
                               events_of_one(channels[c], laps, difference[c], reach)})

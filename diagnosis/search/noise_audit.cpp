@@ -258,6 +258,7 @@ double exactness(const ComparedChannel& channel, const Series& residual) {
     case SignalKind::twist:
       return is_rotary(channel.axis) ? 5e-9 : 1e-9;
     case SignalKind::deflection:
+    case SignalKind::bar:
       return 5e-9;
     default:
       break;

@@ -20,7 +20,8 @@
 // and 5 % of what remains are equivalent to it on this record.
 //
 // What found effects explain is never known better than to half a percent: of what a further effect
-// gains in a channel only that counts which exceeds 0.5 % of what they explain there.
+// gains in a channel only that counts which exceeds 0.5 % of what they explain there, but for what
+// is gained while none of them does anything.
 //
 // Of candidates that do as well as the best one, that with the fewest numbers of the most usual
 // size stands for all.

@@ -168,7 +168,7 @@ std::vector<double> TrialValuesOf::find_wavelengths(std::size_t axis, const Colu
   std::vector<std::size_t> channels;
   for (std::size_t c = 0; c < residual.size(); ++c) {
     const ComparedChannel& channel = evidence_->replica().channels()[c];
-    if ((channel.kind == SignalKind::deflection || channel.axis == axis) && !residual[c].empty())
+    if ((is_reading(channel.kind) || channel.axis == axis) && !residual[c].empty())
       channels.push_back(c);
   }
   const double share = share_of_samples(record);
@@ -203,7 +203,7 @@ std::vector<double> TrialValuesOf::find_wavelengths(std::size_t axis, const Colu
 double TrialValuesOf::largest_reading() const {
   double largest = 0;
   for (const ComparedChannel& c : evidence_->replica().channels()) {
-    if (c.kind != SignalKind::deflection) continue;
+    if (!is_reading(c.kind)) continue;
     for (const double value : evidence_->record().find(c.kind, c.axis)->value)
       if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
   }
@@ -214,7 +214,7 @@ double TrialValuesOf::find_jump(const Column& residual) const {
   const std::size_t window = 50;
   double largest = 0, at = 0;
   for (std::size_t c = 0; c < residual.size(); ++c) {
-    if (evidence_->replica().channels()[c].kind != SignalKind::deflection) continue;
+    if (!is_reading(evidence_->replica().channels()[c].kind)) continue;
     const std::vector<float>& z = residual[c];
     double before = 0, after = 0;
     for (std::size_t k = 0; k + window < z.size(); ++k) {
@@ -239,7 +239,7 @@ std::vector<double> TrialValuesOf::find_ringing(const Column& residual) const {
         2 * kPi * (kLowest + kStep * static_cast<double>(i)) * evidence_->record().period;
     for (std::size_t c = 0; c < residual.size(); ++c) {
       const std::vector<float>& z = residual[c];
-      if (evidence_->replica().channels()[c].kind != SignalKind::deflection || z.empty()) continue;
+      if (!is_reading(evidence_->replica().channels()[c].kind) || z.empty()) continue;
       for (const RecordBlock& block : evidence_->partition().blocks) {
         if (block.held_out) continue;
         const double window = 2 * kPi / static_cast<double>(block.end - block.begin);

@@ -520,7 +520,7 @@ def lean_with_speed(m, rng):
 @unknown
 def clamp_slips(m, rng):
     """The piece slips in its clamp at some time, once."""
-    d, t0 = rng.uniform(2, 5) * 1e-6 * rng.choice([-1, 1]), rng.uniform(20, 45)
+    d, t0 = rng.uniform(2, 5) * 1e-6 * rng.choice([-1, 1]), rng.uniform(20, 42)
     m.pose.append(lambda t, q, v, a: np.stack([d * (t > t0), 0 * t, 0 * t], axis=1))
     return {"law": "displacement of X as f(t)", "hook": "displacement", "axis": "X"}
 

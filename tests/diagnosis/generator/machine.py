@@ -111,8 +111,8 @@ def healthy(factors, rng):
     return m
 
 
-def record(commands, machines, seed):
-    """Simulates machines on one program. commands: (ticks, 5) SI. Returns one dict of series each."""
+def drives_of(machines):
+    """Their drives, side by side."""
     d = drive_model.Drives(len(machines))
     for r, m in enumerate(machines):
         for name in drive_model.NAMES:
@@ -131,12 +131,18 @@ def record(commands, machines, seed):
         d.friction_factor += [(axis, r, f) for axis, f in m.friction_factor]
         d.load_force += [(axis, r, f) for axis, f in m.load_force]
         d.command.update({(axis, r): f for axis, f in m.command.items()})
-    series = drive_model.simulate(commands, d, seed)
+    return d
+
+
+def record(commands, machines, seed):
+    """Simulates machines on one program. commands: (ticks, 5) SI. Returns one dict of series each."""
+    series = drive_model.simulate(commands, drives_of(machines), seed)
     return [measure(commands, m, {k: s[:, :, r].astype(float) for k, s in series.items()},
                     np.random.default_rng([seed, r])) for r, m in enumerate(machines)]
 
 
-def measure(commands, m, s, rng):
+def tip(commands, m, s):
+    """Times, positions of the axes, and where the tool is seen from the piece."""
     t = np.arange(len(commands)) * drive_model.kTick
     q = commands + s["load"]
     v = np.gradient(q, drive_model.kTick, axis=0)
@@ -145,7 +151,11 @@ def measure(commands, m, s, rng):
     for axis, f in m.displacement:
         true[:, axis] += f(t, q[:, axis], v[:, axis], a[:, axis], s["force"][:, axis])
     extra = sum((f(t, q, v, a) for f in m.pose), np.zeros((len(t), 3)))
-    p, turn = kinematics.tip_in_piece(m.geometry, true, extra)
+    return (t, q, *kinematics.tip_in_piece(m.geometry, true, extra))
+
+
+def measure(commands, m, s, rng):
+    t, q, p, turn = tip(commands, m, s)
     felt, _ = probe_model.deflection(m.probe, m.piece, p, turn)
     noise = rng.standard_normal((3, len(t), 5))
     return {
