@@ -159,9 +159,8 @@ CommandedMotion commanded_motion(const Record& record) {
 }
 
 bool is_followed(const Record& record, std::size_t axis) {
-  const bool probed =
-      std::any_of(record.signals.begin(), record.signals.end(),
-                  [](const MeasuredSignal& s) { return is_reading(s.kind); });
+  const bool probed = std::any_of(record.signals.begin(), record.signals.end(),
+                                  [](const MeasuredSignal& s) { return is_reading(s.kind); });
   const auto has = [&](SignalKind kind) { return record.find(kind, axis) != nullptr; };
   return !probed && !has(SignalKind::command) && has(SignalKind::position) &&
          (has(SignalKind::twist) || has(SignalKind::force));
