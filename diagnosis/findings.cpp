@@ -651,30 +651,49 @@ class Report {
     d_.found = law.machine;
   }
 
-  void tell_excitation() {
+  /// Of candidates, from those of the trials: the smallest size that is seen; of limits the
+  /// largest.
+  std::map<std::size_t, double> limits_of_candidates(const std::vector<double>& of_trials) const {
     std::map<std::size_t, double> limits;
-    for (const TrialColumns& t : selection_.trials) {
-      double& limit = limits.try_emplace(t.trial.candidate, t.detection_limit).first->second;
-      // The smallest size that is seen; of limits the largest.
-      const bool largest = t.trial.directions.front().whole && std::isfinite(limit);
-      if (std::isfinite(t.detection_limit))
-        limit = largest ? std::max(limit, t.detection_limit) : std::min(limit, t.detection_limit);
+    for (std::size_t i = 0; i < of_trials.size(); ++i) {
+      const Trial& trial = selection_.trials[i].trial;
+      double& limit = limits.try_emplace(trial.candidate, of_trials[i]).first->second;
+      const bool largest = trial.directions.front().whole && std::isfinite(limit);
+      if (std::isfinite(of_trials[i]))
+        limit = largest ? std::max(limit, of_trials[i]) : std::min(limit, of_trials[i]);
     }
+    return limits;
+  }
+
+  void tell_excitation() {
+    const auto& beside = selection_.beside_found;
+    std::vector<double> alone;
+    for (const TrialColumns& t : selection_.trials) alone.push_back(t.detection_limit);
+    const std::map<std::size_t, double> limits = limits_of_candidates(alone),
+                                        limits_beside =
+                                            beside ? limits_of_candidates(beside->of_trials)
+                                                   : std::map<std::size_t, double>{};
     double finest = std::numeric_limits<double>::infinity();  // slip of a period that would show
     for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
       if (is_reading(evidence_.replica().channels()[c].kind))
         finest = std::min(finest, 5 * std::sqrt(2.0) * evidence_.noise().channels[c].rms /
                                       of_.declared.probe.signal_period);
-    if (finest < 1) d_.excitation.push_back({"probe.period_slip", finest, true, "", ""});
+    if (finest < 1) d_.excitation.push_back({"probe.period_slip", finest, true, "", "", {}});
     for (const auto& [c, limit] : limits) {
       const Candidate& candidate = of_.candidates[c];
       double typical = 0;
       for (std::size_t i = 0; i < candidate.numbers.size() && typical == 0; ++i)
         typical = std::abs(candidate.numbers[i].typical);
       const bool limited = is_limit(candidate.numbers.front());
-      Excitation e{candidate.name(), limit, limited ? std::isfinite(limit) : limit < typical, "",
-                   candidate.numbers.front().key};
+      Excitation e{candidate.name(),
+                   limit,
+                   limited ? std::isfinite(limit) : limit < typical,
+                   "",
+                   candidate.numbers.front().key,
+                   {}};
       if (!e.excited) e.program = program_for(candidate.effect);
+      if (const auto found = limits_beside.find(c); found != limits_beside.end())
+        e.beside_found = found->second;
       if (e.excited || !selection_.interrupted) d_.excitation.push_back(std::move(e));
     }
     for (std::size_t i = 0; i < selection_.release_limits.size(); ++i) {
@@ -682,9 +701,14 @@ class Report {
       if (n.key.starts_with("effects.setup.")) continue;
       const auto [place, effect] = place_and_effect(n.key);
       const double limit = selection_.release_limits[i];
-      Excitation e{never_quite_absent(n.key) ? place + "." + effect : n.key, limit,
-                   std::isfinite(limit), "", n.key};
+      Excitation e{never_quite_absent(n.key) ? place + "." + effect : n.key,
+                   limit,
+                   std::isfinite(limit),
+                   "",
+                   n.key,
+                   {}};
       if (!e.excited) e.program = program_for(effect);
+      if (beside) e.beside_found = beside->of_releases[i];
       d_.excitation.push_back(std::move(e));
     }
   }

@@ -64,6 +64,8 @@ struct Excitation {
   bool excited = false;
   std::string program;  ///< the canned program that would show it; empty if excited
   std::string key;      ///< of that number
+  /// The limit beside what was found, and of what was found beside the rest; none: nothing was.
+  std::optional<double> beside_found{};
 };
 
 /// One rung of the ladder: the state after adding an effect.

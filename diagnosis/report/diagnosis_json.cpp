@@ -43,12 +43,14 @@ Json figure_json(const SignalFigure& f) {
 }
 
 Json excitation(const Excitation& e) {
-  return {{"name", e.name},
-          {"excited", e.excited},
-          {"detection_limit", finite(e.detection_limit)},
-          {"key", e.key},
-          {"unit", unit_of_key(e.key)},
-          {"program", e.program}};
+  Json json = {{"name", e.name},
+               {"excited", e.excited},
+               {"detection_limit", finite(e.detection_limit)},
+               {"key", e.key},
+               {"unit", unit_of_key(e.key)},
+               {"program", e.program}};
+  if (e.beside_found) json["detection_limit_beside_found"] = finite(*e.beside_found);
+  return json;
 }
 
 Json rung(const Rung& r) {

@@ -187,19 +187,29 @@ std::string correlation_section(const DiagnosisStory& story,
   return text;
 }
 
+std::string size_cell(const Excitation& e, double limit) {
+  return e.excited && std::isfinite(limit) ? fmt::format("{:.3g} {}", limit, unit_of_key(e.key))
+                                           : std::string("not excited");
+}
+
 std::string excitation_section(const std::vector<Excitation>& all) {
   if (all.empty()) return "";
-  std::string text =
+  const bool found = std::any_of(all.begin(), all.end(),
+                                 [](const Excitation& e) { return e.beside_found.has_value(); });
+  std::string text = fmt::format(
       "<h2>What this run could have shown</h2>\n<table><tr><th>candidate</th><th>smallest size "
-      "that "
-      "would show</th><th>program that would show it</th></tr>\n";
-  for (const Excitation& e : all)
+      "that would show</th>{}<th>program that would show it</th></tr>\n",
+      found ? "<th>beside what else was found</th>" : "");
+  for (const Excitation& e : all) {
+    const std::string beside = !e.beside_found ? ""
+                               : e.excited && !std::isfinite(*e.beside_found)
+                                   ? "hidden"
+                                   : size_cell(e, *e.beside_found);
     text += fmt::format(
-        "<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n", escaped(e.name),
-        e.excited && std::isfinite(e.detection_limit)
-            ? fmt::format("{:.3g} {}", e.detection_limit, unit_of_key(e.key))
-            : std::string("not excited"),
+        "<tr><td>{}</td><td>{}</td>{}<td>{}</td></tr>\n", escaped(e.name),
+        size_cell(e, e.detection_limit), found ? "<td>" + beside + "</td>" : "",
         e.program.empty() ? std::string() : "<code>vcnc program " + escaped(e.program) + "</code>");
+  }
   return text + "</table>\n";
 }
 

@@ -22,27 +22,19 @@ Eigen::MatrixXd information_of(const Ground& ground) {
   return a;
 }
 
-/// Steps at which as much gain counts as is needed, from the gain of one step in each channel.
-double steps_to(const std::vector<double>& per_step, const Needed& needed) {
-  const auto counts = [&](double squared) {
-    double sum = 0;
-    for (std::size_t c = 0; c < per_step.size(); ++c)
-      sum += std::max(0.0, per_step[c] * squared - (needed.doubt.empty() ? 0 : needed.doubt[c]));
-    return sum;
-  };
-  double low = 1e-24, high = 1e24;
-  if (counts(high) < needed.counted_gain) return kNever;
-  while (high / low > 1.0001) {
-    const double middle = std::sqrt(low * high);
-    (counts(middle) < needed.counted_gain ? low : high) = middle;
-  }
-  return std::sqrt(high);
-}
+constexpr double kShows = 0.02;  ///< part of a gain that a channel must have to be concerned
 
 /// Steps at which one consequence at least is what is needed.
-double steps_to(const Consequence& per_step, const Consequence& needed) {
+double steps_to_reach(const Consequence& needed, const Consequence& per_step) {
   return std::min(needed.contour_um / per_step.contour_um,
                   needed.of_noise_but_readings / per_step.of_noise_but_readings);
+}
+
+/// In the unit of the first number of a trial.
+double in_its_unit(const Trial& trial, double steps) {
+  const Direction& first = trial.directions.front();
+  if (!first.whole) return steps * std::abs(first.step);
+  return steps <= 1 ? std::abs(trial.values[first.number] + first.step) : kNever;
 }
 
 constexpr double kFar = 10;   ///< times below what was simulated, so that it is tried
@@ -97,43 +89,121 @@ std::vector<Bracket> far_below(const std::vector<TrialColumns>& trials) {
 
 }  // namespace
 
-void find_detection_limits(const Evidence& evidence, const Ground& ground, const Needed& needed,
-                           std::vector<TrialColumns>& trials) {
-  const Eigen::Index n = ground.precision.size();
-  const Eigen::LDLT<Eigen::MatrixXd> factor(information_of(ground));
+DetectionLimits::DetectionLimits(const Evidence& evidence, const Ground& ground, Needed needed)
+    : evidence_(evidence),
+      ground_(ground),
+      needed_(std::move(needed)),
+      information_(information_of(ground)) {}
+
+double DetectionLimits::steps_to(const std::vector<double>& per_step,
+                                 const std::vector<double>& at_rest) const {
+  const auto of = [](const std::vector<double>& v, std::size_t c) {
+    return c < v.size() ? v[c] : 0.0;
+  };
+  double all = 0, left = 0;
+  for (const double p : per_step) all += std::max(0.0, p);
+  for (std::size_t c = 0; c < per_step.size(); ++c)
+    if (per_step[c] > kShows * all) left += std::max(0.0, of(needed_.left, c));
+  const double least = std::max(needed_.counted_gain, needed_.share / (1 - needed_.share) * left);
+  const auto counts = [&](double squared) {
+    double sum = 0;
+    for (std::size_t c = 0; c < per_step.size(); ++c) {
+      const double gain = std::max(0.0, per_step[c] * squared);
+      const double while_acting = (1 - of(at_rest, c)) * gain;
+      sum += gain - std::min({gain, of(needed_.doubt, c),
+                              at_rest.empty() ? gain : while_acting + of(needed_.anywhere, c)});
+    }
+    return sum;
+  };
+  double low = 1e-24, high = 1e24;
+  if (counts(high) < least) return kNever;
+  while (high / low > 1.0001) {
+    const double middle = std::sqrt(low * high);
+    (counts(middle) < least ? low : high) = middle;
+  }
+  return std::sqrt(high);
+}
+
+std::vector<double> DetectionLimits::part_at_rest(const Column& column) const {
+  std::vector<double> part = chi2_at_rest(evidence_, column, needed_.acting);
+  const std::vector<double> all = evidence_.chi2_of(column, Role::held_out);
+  for (std::size_t c = 0; c < part.size(); ++c) part[c] = all[c] > 0 ? part[c] / all[c] : 0;
+  return part;
+}
+
+DetectionLimits::Limit DetectionLimits::of(TrialColumns& t) const {
+  const Eigen::Index n = ground_.precision.size();
+  t.ground.learn(evidence_, ground_.columns, t.columns);
+  const RoleGrams& across = t.ground.products();
+  Limit least;
+  for (std::size_t d = 0; d < t.columns.size(); ++d) {
+    const auto at = static_cast<Eigen::Index>(d);
+    const double all = t.own.fitted(at, at) + t.own.held_out(at, at);
+    const Eigen::VectorXd nc = (across.fitted + across.held_out).block(1, at, n, 1);
+    const Eigen::VectorXd others = n > 0 ? Eigen::VectorXd(information_.solve(nc)) : nc;
+    const double left = all - nc.dot(others);
+    // What is left of a column that the others can make up is rounding.
+    if (!(left > 1e-6 * all)) continue;
+    std::vector<double> per_step;  // gain in each channel
+    for (std::size_t c = 0; c < across.held_out_of.size(); ++c)
+      per_step.push_back(t.own.held_out_of[c](at, at) -
+                         2 * others.dot(across.held_out_of[c].block(1, at, n, 1).col(0)) +
+                         others.dot(ground_.grams.held_out_of[c].block(1, 1, n, n) * others));
+    const double seen = std::max(kDeviations / std::sqrt(left),
+                                 steps_to_reach(needed_.consequence, t.consequence[d]));
+    double counted = steps_to(per_step, {});
+    if (!needed_.acting.empty() && counted > seen)
+      counted = steps_to(per_step, part_at_rest(t.columns[d].unpacked()));
+    if (const double steps = std::max(seen, counted); steps < least.steps) least = {steps, d};
+  }
+  return least;
+}
+
+std::vector<double> DetectionLimits::of_releases(const std::vector<FreedNumber>& linear,
+                                                 const std::vector<FreedNumber>& numbers,
+                                                 double pull) const {
+  const Eigen::Index n = ground_.precision.size();
+  const Eigen::MatrixXd inverse =
+      information_.solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
+  std::vector<double> limits(numbers.size(), kNever);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto same = std::find_if(linear.begin(), linear.end(), [&](const FreedNumber& l) {
+      return l.number.key == numbers[i].number.key;
+    });
+    if (same == linear.end() || !(numbers[i].tolerance > 0)) continue;
+    const auto at = static_cast<Eigen::Index>(same - linear.begin());
+    const double typical = numbers[i].number.typical, tolerance = numbers[i].tolerance / typical;
+    const double prior = 1 / (tolerance * tolerance);
+    const double information = 1 / inverse(at, at) - ground_.precision[at];
+    if (information <= 1e-6 * prior) continue;
+    const Eigen::VectorXd step = inverse.col(at) / inverse(at, at);  // the others go along
+    std::vector<double> per_step;
+    for (const Eigen::MatrixXd& g : ground_.grams.held_out_of)
+      per_step.push_back(step.dot(g.block(1, 1, n, n) * step));
+    // What data and tolerance agree on is information / (information + prior) of the change.
+    const double pulled = pull * tolerance * (information + prior) / information;
+    limits[i] =
+        std::max({pulled, kDeviations / std::sqrt(information), steps_to(per_step, {})}) * typical;
+  }
+  return limits;
+}
+
+double DetectionLimits::in_its_unit(TrialColumns& t) const {
+  return t.later_than_linear * vcnc::in_its_unit(t.trial, of(t).steps);
+}
+
+void find_detection_limits(const DetectionLimits& limits, std::vector<TrialColumns>& trials) {
   parallel_for(trials.size(), [&](std::size_t i) {
     TrialColumns& t = trials[i];
-    t.ground.learn(evidence, ground.columns, t.columns);
-    const RoleGrams& across = t.ground.products();
-    double steps = kNever;
-    for (std::size_t d = 0; d < t.columns.size(); ++d) {
-      const auto at = static_cast<Eigen::Index>(d);
-      const double all = t.own.fitted(at, at) + t.own.held_out(at, at);
-      const Eigen::VectorXd nc = (across.fitted + across.held_out).block(1, at, n, 1);
-      const Eigen::VectorXd others = n > 0 ? Eigen::VectorXd(factor.solve(nc)) : nc;
-      const double left = all - nc.dot(others);
-      // What is left of a column that the others can make up is rounding.
-      if (!(left > 1e-6 * all)) continue;
-      std::vector<double> per_step;  // gain in each channel
-      for (std::size_t c = 0; c < across.held_out_of.size(); ++c)
-        per_step.push_back(t.own.held_out_of[c](at, at) -
-                           2 * others.dot(across.held_out_of[c].block(1, at, n, 1).col(0)) +
-                           others.dot(ground.grams.held_out_of[c].block(1, 1, n, n) * others));
-      const double of_this = std::max({kDeviations / std::sqrt(left), steps_to(per_step, needed),
-                                       steps_to(t.consequence[d], needed.consequence)});
-      if (of_this < steps) steps = of_this, t.shows_first = d;
-    }
-    const Direction& first = t.trial.directions.front();
-    if (first.whole)
-      t.detection_limit = steps <= 1 ? std::abs(t.trial.values[first.number] + first.step) : kNever;
-    else
-      t.detection_limit = steps * std::abs(first.step);
+    const DetectionLimits::Limit limit = limits.of(t);
+    t.shows_first = limit.direction;
+    t.detection_limit = in_its_unit(t.trial, limit.steps);
   });
 }
 
 void try_detection_limits(const Evidence& evidence, const Machine& base,
                           const Prediction& prediction, const std::vector<Candidate>& candidates,
-                          const Ground& ground, const Needed& needed,
+                          const DetectionLimits& limits,
                           const std::function<bool(double)>& keep_going,
                           std::vector<TrialColumns>& trials) {
   std::vector<Bracket> open = far_below(trials);
@@ -143,35 +213,20 @@ void try_detection_limits(const Evidence& evidence, const Machine& base,
     std::vector<TrialColumns> tried =
         simulate_trials(evidence, base, prediction, candidates, std::move(sizes), keep_going);
     if (!keep_going(1)) return;
-    find_detection_limits(evidence, ground, needed, tried);
+    find_detection_limits(limits, tried);
     for (std::size_t i = 0; i < open.size(); ++i) {
       Bracket& b = open[i];
       b.narrow(b.next(), b.next() * limit_in_steps(tried[i]));
       if (!b.closed()) continue;
       const std::size_t of = trials[b.trial].trial.candidate;
       for (TrialColumns& t : trials)
-        if (t.trial.candidate == of) t.detection_limit *= b.seen / b.linear;
+        if (t.trial.candidate == of) {
+          t.later_than_linear = b.seen / b.linear;
+          t.detection_limit *= t.later_than_linear;
+        }
     }
     std::erase_if(open, [](const Bracket& b) { return b.closed(); });
   }
-}
-
-std::vector<double> release_limits(const Ground& ground, const std::vector<FreedNumber>& numbers,
-                                   double pull, double gain) {
-  const Eigen::Index n = ground.precision.size();
-  const Eigen::MatrixXd inverse =
-      information_of(ground).ldlt().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
-  std::vector<double> limits(numbers.size(), kNever);
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const auto at = static_cast<Eigen::Index>(i);
-    const double prior = ground.precision[at], information = 1 / inverse(at, at) - prior;
-    if (prior <= 0 || information <= 1e-6 * prior) continue;
-    // What data and tolerance agree on is information / (information + prior) of the change.
-    const double pulled = pull / std::sqrt(prior) * (information + prior) / information;
-    const double gained = std::sqrt(gain / information);
-    limits[i] = std::max(pulled, gained) * numbers[i].number.typical;
-  }
-  return limits;
 }
 
 }  // namespace vcnc

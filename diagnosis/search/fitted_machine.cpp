@@ -289,6 +289,16 @@ std::vector<FreedNumber> FittedMachine::numbers() const {
   return all;
 }
 
+FittedMachine FittedMachine::without_effect(std::size_t i) const {
+  FittedMachine less = *this;
+  std::size_t first = 0;
+  for (std::size_t j = 0; j < i; ++j) first += added[j].numbers.size();
+  const auto from = less.columns.begin() + static_cast<std::ptrdiff_t>(first);
+  less.columns.erase(from, from + static_cast<std::ptrdiff_t>(added[i].numbers.size()));
+  less.added.erase(less.added.begin() + static_cast<std::ptrdiff_t>(i));
+  return less;
+}
+
 FittedMachine FittedMachine::holding(const std::string& key, const FittedMachine& base) const {
   FittedMachine held = *this;
   std::erase_if(held.released, [&](const ReleasedNumber& r) { return r.key == key; });

@@ -52,6 +52,8 @@ struct FittedMachine {
   std::vector<ActingSlices> acting() const;  ///< each of the same
   /// Nuisances and added effects with their columns.
   LinearPart linear() const;
+  /// Without one of the added effects and its columns, everything else as it was computed.
+  FittedMachine without_effect(std::size_t i) const;
   /// With a declared number that was released held again as in `base`, nothing fitted.
   FittedMachine holding(const std::string& key, const FittedMachine& base) const;
 };

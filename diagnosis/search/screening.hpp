@@ -40,7 +40,8 @@ struct TrialColumns {
   RememberedProducts ground;
   /// Of its first number; where that is a limit, the limit itself if it would be seen.
   double detection_limit = std::numeric_limits<double>::infinity();  ///< see detection_limits.hpp
-  std::size_t shows_first = 0;  ///< the direction that it is the limit of
+  std::size_t shows_first = 0;   ///< the direction that it is the limit of
+  double later_than_linear = 1;  ///< what it was taken higher by
 };
 
 struct Screened {

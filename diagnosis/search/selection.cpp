@@ -73,6 +73,8 @@ class Search {
       // Where nothing is found, it was a matter of tolerance after all.
       if (result_.found.found() == 0) result_.found = result_.base = fitted;
       evidence_.anchor(result_.found.machine);
+      if (result_.found.found() > 0)
+        result_.beside_found = limits_beside(rules_, result_.base, result_.found, needed());
     }
     result_.interrupted = !going_;
     return std::move(result_);
@@ -394,14 +396,16 @@ class Search {
     result_.trials = simulate_trials(evidence_, result_.base.machine, result_.base.prediction,
                                      candidates_, all, [&](double s) { return go(doing, s); });
     const Ground ground(evidence_, result_.base.residual, result_.base.nuisances);
-    find_detection_limits(evidence_, ground, needed(), result_.trials);
+    const DetectionLimits limits(evidence_, ground, needed());
+    find_detection_limits(limits, result_.trials);
     try_detection_limits(
-        evidence_, result_.base.machine, result_.base.prediction, candidates_, ground, needed(),
+        evidence_, result_.base.machine, result_.base.prediction, candidates_, limits,
         [&](double s) { return go("trying detection limits", s); }, result_.trials);
     at_base_ = result_.trials;
-    result_.release_limits =
-        release_limits(Ground(evidence_, fitted.residual, fitted.nuisances),
-                       fitted.nuisances.numbers, options_.out_of_tolerance, options_.release_gain);
+    const Ground of_all(evidence_, fitted.residual, fitted.nuisances);
+    result_.release_limits = DetectionLimits(evidence_, of_all, needed())
+                                 .of_releases(fitted.nuisances.numbers, fitted.nuisances.numbers,
+                                              options_.out_of_tolerance);
   }
 
   /// What an effect of a drive does depends on the others that it has (play rattles where nothing
@@ -425,7 +429,9 @@ class Search {
     std::vector<TrialColumns> anew =
         simulated_with(now, std::move(again), "simulating drives anew");
     for (std::size_t i = 0; i < which.size(); ++i) {
-      anew[i].detection_limit = result_.trials[which[i]].detection_limit;
+      const TrialColumns& before = result_.trials[which[i]];
+      anew[i].detection_limit = before.detection_limit;
+      anew[i].later_than_linear = before.later_than_linear;
       result_.trials[which[i]] = std::move(anew[i]);
     }
   }
@@ -569,12 +575,7 @@ class Search {
   enum class Common { held, free };
   /// Without one of its effects, everything else as it was.
   FittedMachine taken_out(const FittedMachine& m, std::size_t i, Common common) const {
-    FittedMachine less = m;
-    std::size_t first = 0;
-    for (std::size_t j = 0; j < i; ++j) first += m.added[j].numbers.size();
-    const auto from = less.columns.begin() + static_cast<std::ptrdiff_t>(first);
-    less.columns.erase(from, from + static_cast<std::ptrdiff_t>(m.added[i].numbers.size()));
-    less.added.erase(less.added.begin() + static_cast<std::ptrdiff_t>(i));
+    FittedMachine less = m.without_effect(i);
     for (const FreeNumber& n : candidates_[m.added[i].candidate].numbers)
       move_number(less.machine, n.key, number_of(declared_, n.key));
     if (common == Common::held) hold_common(less);

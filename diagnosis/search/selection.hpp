@@ -37,6 +37,7 @@
 #include "diagnosis/search/evidence.hpp"
 #include "diagnosis/search/fitted_machine.hpp"
 #include "diagnosis/search/generic_laws.hpp"
+#include "diagnosis/search/limits_beside.hpp"
 #include "diagnosis/search/screening.hpp"
 
 namespace vcnc {
@@ -60,8 +61,9 @@ struct SelectionResult {
   double floor = 0;                ///< what noise leaves of held-out chi-square
   std::vector<LadderStep> ladder;  ///< one per addition
   std::vector<TrialColumns> trials;
-  std::vector<double> release_limits;  ///< of the nuisances of `base`
-  std::optional<LawFit> law_alone;     ///< of `base`, where it was looked for
+  std::vector<double> release_limits;        ///< of the nuisances of `base`
+  std::optional<LimitsBeside> beside_found;  ///< where something was found
+  std::optional<LawFit> law_alone;           ///< of `base`, where it was looked for
   bool interrupted = false;
 };
 

@@ -104,5 +104,48 @@ TEST(DetectionLimit, OfAnEffectThatSmallSizesDoNotHaveIsWhereItBegins) {
   EXPECT_LT(play, 0.05);  // where it is linear
 }
 
+/// Of the held-out chi-square of x, the part on the line, where y stands.
+double part_on_the_line(const Record& record, std::size_t lap, int laps) {
+  const std::vector<double>& x = record.find(SignalKind::command, 0)->value;
+  double all = 0, line = 0, mean = 0;
+  const std::size_t from = 2 * lap * static_cast<std::size_t>(laps);
+  for (std::size_t k = 0; k < x.size(); ++k) mean += x[k] / static_cast<double>(x.size());
+  for (std::size_t k = 0; k < x.size(); ++k) all += std::pow(x[k] - mean, 2);
+  for (std::size_t k = from; k < x.size(); ++k) line += std::pow(x[k] - mean, 2);
+  return line / all;
+}
+
+TEST(DetectionLimit, BesideALargeEffectIsWhatShowsWhileThatRests) {
+  Record record = toy::commands(1000, 4);
+  const auto limits = [&](double squareness_urad) {
+    toy::measure(record, toy::machine({{"effects.geometry.squareness.xy_urad", squareness_urad}}),
+                 2);
+    toy::ToyReplica replica(record);
+    Evidence evidence(record, replica, Machine());
+    DiagnosisOptions options;
+    options.least_contour_um = options.least_of_noise = 0;
+    options.share_of_found = 0.005;
+    return select_effects_of(evidence, Machine(), toy::candidates(), options, {});
+  };
+  const SelectionResult clean = limits(0);
+  EXPECT_FALSE(clean.beside_found);
+  const SelectionResult found = limits(1000);
+  ASSERT_EQ(found.found.added.size(), 1u);
+  ASSERT_TRUE(found.beside_found);
+  const std::vector<Candidate> all = toy::candidates();
+  for (std::size_t t = 0; t < found.trials.size(); ++t) {
+    const std::string& effect = all[found.trials[t].trial.candidate].effect;
+    const double alone = found.trials[t].detection_limit, beside = found.beside_found->of_trials[t];
+    // Half a percent of what 1 mrad explains is more than a scale gains on circles: what counts of
+    // it is its gain on the line, along which squareness does nothing.
+    double expected = 0;
+    if (effect == "scale_error") expected = alone / std::sqrt(part_on_the_line(record, 1000, 4));
+    if (effect == "squareness" || effect == "coulomb") expected = alone;  // nothing hides these
+    if (expected > 0) {
+      EXPECT_NEAR(beside, expected, 0.02 * expected) << effect;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace vcnc::detection_limits_test

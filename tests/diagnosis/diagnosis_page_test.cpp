@@ -34,9 +34,13 @@ Diagnosis found_backlash() {
   d.effects = {backlash()};
   d.figures = {{{SignalKind::position, kX}, "held-out laps", 3e-6, 1e-6, 0.9e-6},
                {{SignalKind::position, kC}, "test <run>", 2e-5, 1e-5, 0}};
-  d.excitation = {{"X.backlash", 0.1, true, "", "effects.X.backlash.gap_um"},
-                  {"C.cogging", std::numeric_limits<double>::infinity(), false, "rotary",
-                   "effects.C.cogging.amplitude_Nm"}};
+  d.excitation = {{"X.backlash", 0.1, true, "", "effects.X.backlash.gap_um", 0.25},
+                  {"C.cogging",
+                   std::numeric_limits<double>::infinity(),
+                   false,
+                   "rotary",
+                   "effects.C.cogging.amplitude_Nm",
+                   {}}};
   d.ladder = {{"", 5000, {3e-6}}, {"X.backlash", 1200, {1e-6}}};
   d.warnings = {"25 samples are missing"};
   return d;
@@ -61,7 +65,9 @@ TEST(DiagnosisJson, HoldsAllThatWasFoundInTheUnitsOfItsNames) {
   EXPECT_NEAR(json["figures"][1]["rms_after"].get<double>(), 2.0626480624709636, 1e-9);
   EXPECT_EQ(json["excitation"][0]["key"], "effects.X.backlash.gap_um");
   EXPECT_EQ(json["excitation"][0]["unit"], "um");
-  EXPECT_TRUE(json["excitation"][1]["detection_limit"].is_null());  // infinite
+  EXPECT_EQ(json["excitation"][0]["detection_limit_beside_found"], 0.25);
+  EXPECT_FALSE(json["excitation"][1].contains("detection_limit_beside_found"));  // nothing found
+  EXPECT_TRUE(json["excitation"][1]["detection_limit"].is_null());               // infinite
   EXPECT_EQ(json["ladder"][1]["chi2"], 1200);
   EXPECT_TRUE(json["law"].is_null());
 }

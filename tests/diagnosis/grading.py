@@ -5,7 +5,8 @@ its excitation table. Strata of single effects: weak below 3 L, strong from 3 L 
 the run does not excite the effect at all, silence is the right answer. A name is right when effect
 and place are; a declared number found out of tolerance is right when it belongs to the effect. An attribution
 is an effect that the report names, minor or not, of the machine or of the measurement but not of the set-up. A pair
-or triple is strong when each of its effects is. A number whose true value is nought (no time constant) has no
+or triple is strong when each of its effects is, and strong beside the others when each is by the limit that is
+stated beside what else was found, too. A number whose true value is nought (no time constant) has no
 relative error.
 """
 
@@ -97,11 +98,16 @@ def in_class(effect, found):
                text.startswith(f"effects.{effect['place']}.{effect['name']}.") for text in found.get("class", []))
 
 
-def limit_of(report, name):
-    """Detection limit in the unit of the first number; None: the report says nothing of it."""
+def limit_of(report, name, beside=False):
+    """Detection limit in the unit of the first number, `beside` what else was found where something was; None: the report
+    says nothing of it."""
+    place, _, effect = name.partition(".")
+    names = {name, f"{name}.deviation", f"{place}.{ALIASES.get(effect, effect)}"}
     for row in report.get("excitation", []):
-        if row["name"] in (name, f"{name}.deviation"):
+        if row["name"] in names:
             value = row.get("detection_limit")
+            if beside:
+                value = row.get("detection_limit_beside_found", value)
             return math.inf if value is None else float(value)
     return None
 
@@ -113,6 +119,11 @@ def strength(effect, size, limit):
     if effect["name"] == "range_clip":
         return math.inf if 0 < size <= limit < math.inf else 0.0
     return size / limit if limit else math.inf
+
+
+def weakest(effects, sizes, limits):
+    strengths = [strength(e, size, l) for e, (_, size), l in zip(effects, sizes, limits)]
+    return math.nan if any(map(math.isnan, strengths)) else min(strengths)
 
 
 def first_number(effect):
@@ -163,8 +174,11 @@ def grade(answer, report, seconds):
         row["exact"] = all(row["right"]) and len(told) == len(effects)
         sizes = answer.get("sizes") or [(f"{e['place']}.{e['name']}", first_number(e)) for e in effects]
         limits = [limit_of(report, name) for name, _ in sizes]
-        strengths = [strength(e, size, l) for e, (_, size), l in zip(effects, sizes, limits)]
-        row["strength"] = math.nan if any(map(math.isnan, strengths)) else min(strengths)
+        row["strength"] = weakest(effects, sizes, limits)
+        # What is told beside something false is measured by its limit alone: falsehoods excuse nothing.
+        false = any(not any(same(e, f) for e in effects) for f in told)
+        row["strength_beside"] = row["strength"] if false else weakest(
+            effects, sizes, [limit_of(report, name, beside=True) for name, _ in sizes])
         row["silent"] = not told and report["verdict"].startswith(SILENT)
         row["errors"], row["covered"] = [], []
         for e in effects:
@@ -232,6 +246,8 @@ def summary(rows):
         some = [r for r in rows if r["kind"] == kind]
         out[f"{kind}: exact set"] = share(r["exact"] for r in some)
         out[f"{kind}: exact set, each effect strong"] = share(r["exact"] for r in some if r["strength"] >= 3)
+        out[f"{kind}: exact set, each effect strong beside the others"] = share(
+            r["exact"] for r in some if min(r["strength"], r["strength_beside"]) >= 3)
         out[f"{kind}: effects found"] = share(flag for r in some for flag in r["right"])
         out[f"{kind}: claims that are true"] = share(
             [True] * sum(sum(r["right"]) for r in some) + [False] * sum(max(0, r["claims"] - sum(r["right"])) for r in some))

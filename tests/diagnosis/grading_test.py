@@ -41,6 +41,25 @@ class Grading(unittest.TestCase):
         minor = grading.grade(TRUTH, report(found("backlash", "X"), found("kv_error", "X", minor=True)), 1)
         self.assertTrue(minor["top"] and not minor["exact"])
 
+    def test_a_second_effect_is_weak_where_the_first_one_hides_it(self):
+        truth = {"kind": "pair", "effects": [
+            {"name": "backlash", "place": "X", "parameters": {"gap_um": 4.0}}, {"name": "scale_error", "place": "Y", "parameters": {"error_ppm": 9.0}}]}
+        limits = [{"name": "X.backlash", "detection_limit": 0.5, "detection_limit_beside_found": 0.5},
+                  {"name": "Y.scale_error", "detection_limit": 1.0, "detection_limit_beside_found": 5.0}]
+        true, false = found("backlash", "X"), found("squareness", "geometry")
+        hidden = grading.grade(truth, report(true, excitation=limits), 1)
+        self.assertEqual((hidden["strength"], hidden["strength_beside"]), (8, 1.8))
+        # What hides it must be there.
+        self.assertEqual(grading.grade(truth, report(true, false, excitation=limits), 1)["strength_beside"], 8)
+        of = grading.summary([hidden, hidden | {"strength_beside": 3.0, "exact": True}])
+        self.assertEqual(of["pair: exact set, each effect strong"], "1/2 (50.0 %)")
+        self.assertEqual(of["pair: exact set, each effect strong beside the others"], "1/1 (100.0 %)")
+
+    def test_a_latency_of_the_bus_has_the_limit_of_a_delay(self):
+        truth = {"kind": "single", "effects": [{"name": "bus_latency", "place": "X", "parameters": {"delay_ms": 1.0}}]}
+        row = grading.grade(truth, report(excitation=[{"name": "X.command_delay", "detection_limit": 0.25}]), 1)
+        self.assertEqual(row["strength"], 4)
+
     def test_another_piece_is_held_against_what_noise_leaves(self):
         limit = [{"name": "X.backlash", "detection_limit": 0.5, "excited": True}]
         right = report(found("backlash", "X", "effects.X.backlash.gap_um", 4.0, 3.9, 4.1), excitation=limit)
@@ -123,7 +142,7 @@ class Grading(unittest.TestCase):
         self.assertEqual((row["errors"], row["covered"]), ([], [False]))
 
     def test_strong_pairs_are_counted_by_themselves(self):
-        rows = [{"kind": "pair", "exact": e, "strength": s, "right": [e, e], "claims": 2, "seconds": 1, "after_over_floor": 1}
+        rows = [{"kind": "pair", "exact": e, "strength": s, "strength_beside": s, "right": [e, e], "claims": 2, "seconds": 1, "after_over_floor": 1}
                 for e, s in ((True, 5), (False, 1.5))]
         of = grading.summary(rows)
         self.assertEqual(of["pair: exact set"], "1/2 (50.0 %)")
