@@ -208,7 +208,7 @@ class Report {
         if (n.whole) e.numbers.push_back({n.key, value, value, value});
       }
       e.gain = a.gain;
-      if (may_be_as_declared(a, e.numbers)) {
+      if (may_be_as_declared(a, of_.declared, intervals)) {
         withhold(candidate, "fits, but may be as declared");
         continue;
       }
@@ -276,19 +276,6 @@ class Report {
     if (others.empty()) return;
     e.separating_program = program_for(of_.candidates[others.front()].effect);
     if (e.separating_program.empty()) e.separating_program = program_for(e.name);
-  }
-
-  /// Whether the intervals of all its sizes hold what is declared of them.
-  bool may_be_as_declared(const AddedEffect& a, const std::vector<FittedNumber>& fitted) const {
-    bool some = false, holds = true;  // a limit that was tried is none of them
-    for (std::size_t i = 0; i < a.numbers.size(); ++i) {
-      const FreedNumber& n = a.numbers[i];
-      if (n.shape || is_phase(n.number)) continue;
-      const double declared = number_of(of_.declared, n.number.key);
-      some = true;
-      holds = holds && fitted[i].low <= declared && declared <= fitted[i].high;
-    }
-    return some && holds;
   }
 
   /// An effect that is not told; what is declared of it goes into the found machine.

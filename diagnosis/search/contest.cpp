@@ -6,6 +6,7 @@
 #include <iterator>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -29,7 +30,9 @@ constexpr double kLeaves = 0.05;       ///< part of what is left that a winner m
 constexpr double kNearly = 0.99;       ///< part of a gain that may be as much when all is refitted
 constexpr double kWorthAFit = 0.5;     ///< of another gain, that sensitivities must promise
 constexpr double kLongWay = 9;         ///< tolerances, where sensitivities are others
+constexpr double kMany = 3;            ///< numbers
 constexpr std::size_t kElsewhere = 2;
+constexpr std::size_t kLifted = 6;  ///< declared numbers in pairs
 constexpr std::size_t kFinalists = 3, kRivals = 4, kMoreRefits = 8;
 
 /// Where so much is left.
@@ -159,8 +162,8 @@ std::vector<Contender> Contest::contenders() {
   sort_by_worth(all);
   put_simplest_first(all);
   if (!all.empty()) begin_elsewhere(all.front(), all_trials);
-  if (all.empty() || all.front().gain < 0.5 * rules_.excess(ground_.held_out))
-    look_ahead(all_screened, all);
+  if (const double numbers = numbers_of_two(all); numbers > 0)
+    look_ahead(all_screened, numbers, all);
   return all;
 }
 
@@ -227,7 +230,7 @@ std::vector<Contender> Contest::refitted(const std::vector<Screened>& list) cons
     if (!rules_.go("refitting " + std::to_string(list.size()) + " candidates",
                    static_cast<double>(done) / static_cast<double>(list.size())))
       return;
-    all[i] = contender({list[i].trial}, list[i].size, list[i].gain);
+    all[i] = contender({&rules_.trials[list[i].trial]}, list[i].size, list[i].gain);
     ++done;
   });
   // What was stopped before it was tried.
@@ -301,8 +304,8 @@ double Contest::intricacy(const Contender& c) const {
   return static_cast<double>(numbers) + 2 * unusual;
 }
 
-Contender Contest::contender(const std::vector<std::size_t>& trials, const Eigen::VectorXd& size,
-                             double promised) const {
+Contender Contest::contender(const std::vector<const TrialColumns*>& trials,
+                             const Eigen::VectorXd& size, double promised) const {
   Contender best;
   // From where the sensitivities point to, and from a third of the way: some effects are not
   // linear and disappoint.
@@ -310,18 +313,18 @@ Contender Contest::contender(const std::vector<std::size_t>& trials, const Eigen
     Contender c;
     c.begun = now_.machine;
     Eigen::Index at = 0;
-    for (const std::size_t t : trials) {
-      const Trial& trial = rules_.trials[t].trial;
+    for (const TrialColumns* t : trials) {
+      const Trial& trial = t->trial;
       const auto width = static_cast<Eigen::Index>(trial.directions.size());
       const std::vector<FreedNumber> numbers =
           start_of(rules_.candidates[trial.candidate], trial,
                    Eigen::VectorXd(share * size.segment(at, width)),
-                   Eigen::VectorXd(rules_.trials[t].own.fitted.diagonal().cwiseSqrt()));
+                   Eigen::VectorXd(t->own.fitted.diagonal().cwiseSqrt()));
       c.numbers.insert(c.numbers.end(), numbers.begin(), numbers.end());
       set_whole_numbers(c.begun, rules_.candidates[trial.candidate], trial);
       at += width;
     }
-    c.candidate = rules_.trials[trials.front()].trial.candidate;
+    c.candidate = trials.front()->trial.candidate;
     c.fit = refit(
         rules_.evidence, c.begun, c.numbers, without(linear_, c.numbers),
         {.max_iterations = kGlance, .begin = Begin::far, .hopeless = kHopeless * ground_.fitted});
@@ -366,7 +369,7 @@ void Contest::begin_elsewhere(Contender& best, const std::vector<Screened>& tria
   for (const Screened& s : trials) {
     if (candidate_of(s) != best.candidate || tried++ == 0) continue;  // it began at the first
     if (others.size() == kElsewhere || !rules_.go("trying other shapes", 0)) break;
-    others.push_back(contender({s.trial}, s.size, s.gain));
+    others.push_back(contender({&rules_.trials[s.trial]}, s.size, s.gain));
     others.back().needed = needed_of(others.back());
   }
   finish(others);
@@ -533,32 +536,105 @@ bool Contest::under_two_conditions(const Contender& c) const {
          (helped == 1 && largest > 0.99 * sum && largest > 4 * rules_.options.least_gain);
 }
 
-/// The best pair of screened candidates, where it does far better than any one.
-void Contest::look_ahead(const std::vector<Screened>& screened, std::vector<Contender>& all) const {
-  const std::size_t n = std::min(rules_.options.pairs_of, screened.size());
-  std::vector<std::pair<std::size_t, std::size_t>> pairs;
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = i + 1; j < n; ++j) pairs.emplace_back(i, j);
+/// What a pair may have: more than anybody has where the best one explains less than half, else
+/// fewer than that, if it has many (a straightness with a wave is a little of everything).
+double Contest::numbers_of_two(const std::vector<Contender>& all) const {
+  if (all.empty() || all.front().gain < 0.5 * rules_.excess(ground_.held_out))
+    return std::numeric_limits<double>::infinity();
+  const double numbers = intricacy(all.front());
+  return numbers > kMany ? numbers : 0;
+}
+
+/// Declared numbers whose tolerance may be lifted, each the only one of an effect.
+std::vector<TrialColumns> Contest::lifted() const {
+  std::vector<TrialColumns> all;
+  for (std::size_t c = 0; c < rules_.candidates.size(); ++c) {
+    const std::vector<FreeNumber>& numbers = rules_.candidates[c].numbers;
+    const auto moves = [](const FreeNumber& n) { return !is_fixed(n); };
+    const auto own = std::find_if(numbers.begin(), numbers.end(), moves);
+    if (std::count_if(numbers.begin(), numbers.end(), moves) != 1) continue;
+    for (std::size_t i = 0; i < now_.nuisances.numbers.size(); ++i) {
+      const FreedNumber& n = now_.nuisances.numbers[i];
+      if (n.number.key != own->key || !may_be_released(rules_.options, n)) continue;
+      TrialColumns t;
+      t.trial.candidate = c;
+      for (const FreeNumber& f : numbers)
+        t.trial.values.push_back(f.key == n.number.key ? n.value : number_of(now_.machine, f.key));
+      t.trial.directions = {
+          {.number = static_cast<std::size_t>(own - numbers.begin()), .step = n.number.typical}};
+      const std::vector<const Column*> column{&now_.nuisances.columns[i]};
+      t.columns = {PackedColumn(*column.front())};
+      t.own = rules_.evidence.cross(column, column);
+      all.push_back(std::move(t));
+    }
+  }
+  return all;
+}
+
+/// Whether all of them that were declared are where they hardly are by their tolerances.
+bool Contest::is_out_of_tolerance(const std::vector<FreedNumber>& numbers) const {
+  for (const FreedNumber& n : numbers)
+    for (const FreedNumber& declared : now_.nuisances.numbers)
+      if (n.number.key == declared.number.key &&
+          std::abs(n.value - declared.centre) <
+              rules_.options.out_of_tolerance * declared.tolerance)
+        return false;
+  return true;
+}
+
+/// The best pair of screened candidates and declared numbers with less than `numbers` where it does
+/// far better than any one, or as well as one that says more.
+void Contest::look_ahead(const std::vector<Screened>& screened, double numbers,
+                         std::vector<Contender>& all) const {
+  struct One {
+    const TrialColumns* trial;
+    double counted;
+    std::size_t candidate() const { return trial->trial.candidate; }
+  };
+  const auto numbers_of = [&](const One& one) {
+    const std::vector<FreeNumber>& of = rules_.candidates[one.candidate()].numbers;
+    return static_cast<double>(std::count_if(
+        of.begin(), of.end(), [](const FreeNumber& n) { return !is_fixed(n) && !is_phase(n); }));
+  };
+  std::vector<One> ones;
+  for (std::size_t i = 0; i < std::min(rules_.options.pairs_of, screened.size()); ++i)
+    ones.push_back({&rules_.trials[screened[i].trial], screened[i].counted});
+  std::vector<TrialColumns> declared = lifted();
+  std::vector<Screened> of_numbers =
+      by_what_counts(screen(rules_.evidence, ground_, doubt_, rules_.candidates, declared));
+  of_numbers.resize(std::min(kLifted, of_numbers.size()));
+  for (const Screened& s : of_numbers) ones.push_back({&declared[s.trial], s.counted});
+  std::vector<std::pair<One, One>> pairs;
+  for (std::size_t i = 0; i < ones.size(); ++i)
+    for (std::size_t j = i + 1; j < ones.size(); ++j)
+      if (ones[i].candidate() != ones[j].candidate() &&
+          numbers_of(ones[i]) + numbers_of(ones[j]) < numbers)
+        pairs.emplace_back(ones[i], ones[j]);
   std::vector<Screened> together(pairs.size());
   parallel_for(pairs.size(), [&](std::size_t p) {
-    together[p] = screen_pair(rules_.evidence, ground_, doubt_, rules_.trials,
-                              screened[pairs[p].first].trial, screened[pairs[p].second].trial);
+    together[p] = screen_pair(rules_.evidence, ground_, doubt_, *pairs[p].first.trial,
+                              *pairs[p].second.trial);
   });
-  if (pairs.empty() || !rules_.go("looking at pairs", 0)) return;
-  const auto best =
-      std::max_element(together.begin(), together.end(),
-                       [](const Screened& x, const Screened& y) { return x.counted < y.counted; });
-  const auto [one, other] = pairs[static_cast<std::size_t>(best - together.begin())];
   const double single = all.empty() ? 0 : all.front().counts;
   const double least =
       std::max(rules_.threshold(ground_.held_out), 0.1 * rules_.excess(ground_.held_out));
-  // One that does nothing beside another makes no pair of it.
-  const double either = std::max(screened[one].counted, screened[other].counted);
-  if (best->counted < std::max(single, either) + least) return;
-  Contender c = contender({best->trial, screened[other].trial}, best->size, best->gain);
-  c.needed = needed_of({c.candidate, candidate_of(screened[other])}, c.fit.held_out_of);
+  const bool fewer = std::isfinite(numbers);
+  const double enough = fewer ? single - band_of(all.front().gain) : single + least;
+  std::optional<std::size_t> best;
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    // One that does nothing beside another makes no pair of it.
+    const double either = std::max(pairs[p].first.counted, pairs[p].second.counted);
+    if (together[p].counted >= std::max(enough, either + least) &&
+        (!best || together[p].counted > together[*best].counted))
+      best = p;
+  }
+  if (!best || !rules_.go("looking at pairs", 0)) return;
+  const auto& [one, other] = pairs[*best];
+  Contender c = contender({one.trial, other.trial}, together[*best].size, together[*best].gain);
+  c.needed = needed_of({one.candidate(), other.candidate()}, c.fit.held_out_of);
   c.counts = counts(c);
-  if (c.counts > single + least && rules_.stands_out(ground_.held_out_of, c.fit.held_out_of))
+  if (c.counts > enough && (!fewer || intricacy(c) < numbers) && is_out_of_tolerance(c.numbers) &&
+      rules_.stands_out(ground_.held_out_of, c.fit.held_out_of))
     all.insert(all.begin(), std::move(c));
 }
 

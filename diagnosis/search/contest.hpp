@@ -2,7 +2,8 @@
 //
 // Screened ones (screening.hpp) that gain enough are refitted nonlinearly, a few iterations each;
 // those that may yet be the best are converged. A declared number whose tolerance is lifted
-// competes with them, and so do pairs where no single one explains half. See selection.hpp for what
+// competes with them, and so do pairs, also with such a number, where no single one explains half
+// or the best has many numbers. See selection.hpp for what
 // is asked of a gain.
 #pragma once
 
@@ -109,14 +110,18 @@ class Contest {
                                  const std::vector<Screened>& screened,
                                  const std::vector<Screened>& list) const;
   std::vector<Contender> refitted(const std::vector<Screened>& list) const;
-  Contender contender(const std::vector<std::size_t>& trials, const Eigen::VectorXd& size,
+  Contender contender(const std::vector<const TrialColumns*>& trials, const Eigen::VectorXd& size,
                       double promised) const;
   void finish(std::vector<Contender>& all) const;
   void begin_elsewhere(Contender& best, const std::vector<Screened>& trials) const;
   enum class Released { where_pulled, anywhere };
   std::vector<Contender> releases(Released which, double as_much) const;
   void refit_released(std::vector<Contender>& all, double least) const;
-  void look_ahead(const std::vector<Screened>& screened, std::vector<Contender>& all) const;
+  double numbers_of_two(const std::vector<Contender>& all) const;
+  std::vector<TrialColumns> lifted() const;
+  bool is_out_of_tolerance(const std::vector<FreedNumber>& numbers) const;
+  void look_ahead(const std::vector<Screened>& screened, double numbers,
+                  std::vector<Contender>& all) const;
   void put_simplest_first(std::vector<Contender>& all) const;
   bool under_two_conditions(const Contender& contender) const;
   double needed_of(const Contender& contender) const;

@@ -119,4 +119,17 @@ std::map<std::string, Interval> intervals_of(const Evidence& evidence, const Fit
   return intervals;
 }
 
+bool may_be_as_declared(const AddedEffect& effect, const Machine& declared,
+                        const std::map<std::string, Interval>& intervals) {
+  bool some = false;
+  for (const FreedNumber& n : effect.numbers) {
+    if (n.shape || is_phase(n.number)) continue;
+    some = true;
+    const auto i = intervals.find(n.number.key);
+    const double half = i == intervals.end() ? 0 : i->second.half_width;
+    if (std::abs(n.value - number_of(declared, n.number.key)) > half) return false;
+  }
+  return some;
+}
+
 }  // namespace vcnc

@@ -31,4 +31,9 @@ bool is_inexact(const Evidence& evidence, const DiagnosisOptions& options, doubl
 std::map<std::string, Interval> intervals_of(const Evidence& evidence, const FittedMachine& machine,
                                              bool inexact = false);
 
+/// Whether the intervals of all amplitudes of an effect hold what is declared: it is not known to
+/// be there at all. Not of one that has none but a limit.
+bool may_be_as_declared(const AddedEffect& effect, const Machine& declared,
+                        const std::map<std::string, Interval>& intervals);
+
 }  // namespace vcnc

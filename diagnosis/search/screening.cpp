@@ -194,14 +194,12 @@ Column left_by(const Ground& ground, const TrialColumns& trial) {
 }
 
 Screened screen_pair(const Evidence& evidence, const Ground& ground, const Doubt& doubt,
-                     const std::vector<TrialColumns>& trials, std::size_t first,
-                     std::size_t second) {
-  const TrialColumns &a = trials[first], &b = trials[second];
+                     const TrialColumns& a, const TrialColumns& b) {
   const std::vector<Column> of_a = unpacked(a.columns), of_b = unpacked(b.columns);
   const RoleGrams ab = evidence.cross(pointers(of_a), pointers(of_b));
   Gain g = gain_of(ground, doubt, beside(a.ground.products(), b.ground.products()),
                    bordered(a.own, ab, b.own));
-  return {first, g.gain, g.counted, std::move(g.size)};
+  return {0, g.gain, g.counted, std::move(g.size)};
 }
 
 }  // namespace vcnc

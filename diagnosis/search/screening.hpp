@@ -80,9 +80,8 @@ std::vector<Screened> screen(const Evidence& evidence, const Ground& ground, con
 /// The residual less what a trial that was screened on this ground explains of it.
 Column left_by(const Ground& ground, const TrialColumns& trial);
 
-/// Of two trials together that were screened on this ground; `trial` means the first.
+/// Of two trials together that were screened on this ground.
 Screened screen_pair(const Evidence& evidence, const Ground& ground, const Doubt& doubt,
-                     const std::vector<TrialColumns>& trials, std::size_t first,
-                     std::size_t second);
+                     const TrialColumns& first, const TrialColumns& second);
 
 }  // namespace vcnc

@@ -10,6 +10,7 @@
 #include "diagnosis/search/contest.hpp"
 #include "diagnosis/search/controller_check.hpp"
 #include "diagnosis/search/detection_limits.hpp"
+#include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/trial_values.hpp"
 #include "model/axes.hpp"
 
@@ -301,27 +302,31 @@ class Search {
   }
 
   /// `trial`, which has the contender `than`, or one of those that did as well, if it clearly does
-  /// better when all is fitted.
+  /// better when all is fitted, or if it is a declared number that does as well and says less.
   FittedMachine best_of_as_good(const FittedMachine& now, FittedMachine trial,
                                 const std::vector<Contender>& contenders, std::size_t than,
                                 const Contest& contest) {
-    std::size_t numbers = contenders[than].numbers.size();
+    const Contender* chosen = &contenders[than];
     const bool leaves = rules_.excess(trial.held_out) > options_.least_gain;
     also_fitted_ = {trial};
     double present = counted_within(trial, contest);
     for (const Contender* other : as_good(contenders, than, leaves)) {
       FittedMachine instead =
           also_fitted_.emplace_back(fitted_with(now, *other, {}, far_more_than(trial)));
-      const double more = std::max(
-          1.0, 1.0 + static_cast<double>(other->numbers.size()) - static_cast<double>(numbers));
+      const double more = std::max(1.0, 1.0 + static_cast<double>(other->numbers.size()) -
+                                            static_cast<double>(chosen->numbers.size()));
       const bool of_one_kind = other->released.empty() == contenders[than].released.empty();
       const double clearly = std::max(more * options_.class_gain,
                                       of_one_kind ? kHalf * rules_.excess(trial.held_out) : 0);
-      const double counts = counted_within(instead, contest);
-      if (counts < present + clearly || !holds_up(instead)) continue;
+      const double counts = counted_within(instead, contest), band = contest.band_of(other->gain);
+      const bool simpler = !other->released.empty() && counts > present - band &&
+                           contest.intricacy(*other) + (present - counts) / band <
+                               contest.intricacy(*chosen) - kClearlySimpler;
+      if (!simpler && counts < present + clearly) continue;
+      if (!holds_up(instead) || !is_certain(instead)) continue;
       present = counts;
       trial = std::move(instead);
-      numbers = other->numbers.size();
+      chosen = other;
     }
     evidence_.anchor(trial.machine);
     return trial;
@@ -352,13 +357,15 @@ class Search {
 
   /// Those after a contender that did as well: an effect instead of a declared number out of
   /// tolerance, or the other way round, and any at all where the contender `leaves` something. What
-  /// each asks of all other numbers shows when these are fitted, too.
+  /// each asks of all other numbers shows when these are fitted, too, of declared numbers most:
+  /// what an effect with more numbers has of its own, they have of others of their drive.
   static std::vector<const Contender*> as_good(const std::vector<Contender>& contenders,
                                                std::size_t than, bool leaves) {
     const Contender& best = contenders[than];
     std::vector<const Contender*> all;
     for (std::size_t i = than + 1; i < contenders.size() && all.size() < kAttempts; ++i)
-      if (contenders[i].counts > kAsGood * best.counts &&
+      if (contenders[i].counts >
+              (contenders[i].released.empty() ? kAsGood : kNearLoss) * best.counts &&
           (leaves || contenders[i].released.empty() != best.released.empty()))
         all.push_back(&contenders[i]);
     return all;
@@ -628,7 +635,7 @@ class Search {
         const double least = counted_within(m, contest) - allowed_loss;
         FittedMachine instead = less;
         add(instead, *better, {});
-        if (holds_up(instead) && counted_within(instead, contest) >= least) {
+        if (holds_up(instead) && is_certain(instead) && counted_within(instead, contest) >= least) {
           m = std::move(instead);  // the last of its kind, so that the next one is here
           continue;
         }
@@ -638,6 +645,14 @@ class Search {
       evidence_.anchor(m.machine);
       ++i;
     }
+  }
+
+  /// Whether what was added last is not as declared for certain: else it is not told, and what is
+  /// in its place would be.
+  bool is_certain(const FittedMachine& m) const {
+    if (m.added.empty()) return true;
+    const bool inexact = is_inexact(evidence_, options_, rules_.floor, m.held_out);
+    return !may_be_as_declared(m.added.back(), declared_, intervals_of(evidence_, m, inexact));
   }
 
   /// Sensitivities tell a large gain to some per mille only: rivals that promise as much are fitted

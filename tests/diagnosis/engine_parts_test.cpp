@@ -362,6 +362,18 @@ class RoundingReplica : public toy::ToyReplica {
   }
 };
 
+TEST(Intervals, OfAllAmplitudesMustHoldWhatIsDeclaredForAnEffectToBeUncertain) {
+  const FreedNumber height{{"effects.X.pitch_periodic.amplitude_um", 2, 0, 1000}, 3.0, 0},
+      period{{"effects.X.pitch_periodic.period_mm", 10, 0.001, 1e4}, 12.0, 0, 0, true};
+  const AddedEffect wave{.candidate = 0, .numbers = {height, period}};
+  const auto uncertain = [&](const AddedEffect& effect, double half_width) {
+    return may_be_as_declared(effect, Machine(), {{height.number.key, {half_width}}});
+  };
+  EXPECT_TRUE(uncertain(wave, 3.1));
+  EXPECT_FALSE(uncertain(wave, 2.9));  // however uncertain the period is
+  EXPECT_FALSE(uncertain({.candidate = 0, .numbers = {period}}, 3.1));  // no amplitude at all
+}
+
 TEST(Evidence, LeavesOutWhatRoundingDecides) {
   Record record = toy::commands(2048, 4);
   toy::measure(record, Machine(), 5);

@@ -128,6 +128,51 @@ TEST(Selection, OfEqualsTakesTheOneOfUsualSize) {
   EXPECT_EQ(result.found.added[0].class_with, std::vector<std::size_t>{0});
 }
 
+/// A guide whose deviations, of sizes that no guide has, are a scale and a squareness together.
+class GuideLikeBoth : public toy::ToyReplica {
+ public:
+  explicit GuideLikeBoth(const Record& commands)
+      : toy::ToyReplica(commands),
+        x_(commands.find(SignalKind::command, 0)->value),
+        y_(commands.find(SignalKind::command, 1)->value) {}
+
+  Prediction predict(const Machine& m) const override {
+    Prediction p = toy::ToyReplica::predict(m);
+    const Straightness& s = m.effects.axis[0].get<Straightness>();
+    std::vector<double> reading = p[2];
+    for (std::size_t k = 0; k < reading.size(); ++k)
+      reading[k] += 10 * (s.first_bow * x_[k] + s.second_bow * y_[k]);
+    p[2] = reading;
+    return p;
+  }
+
+ private:
+  std::vector<double> x_, y_;
+};
+
+TEST(Selection, AnEffectAndADeclaredNumberAreToldForOneThatSaysMore) {
+  Record record = toy::commands(1000, 4);
+  toy::measure(record,
+               toy::machine({{"effects.geometry.squareness.xy_urad", 60},
+                             {"effects.X.scale_error.error_ppm", -40}}),
+               17);
+  GuideLikeBoth replica(record);
+  Evidence evidence(record, replica, Machine());
+  std::vector<Candidate> all = toy::candidates();
+  all.push_back({"straightness",
+                 "X",
+                 {{"effects.X.straightness.first_bow_um", 0.01, -1000, 1000},
+                  {"effects.X.straightness.second_bow_um", 0.01, -1000, 1000}},
+                 {}});
+  const SelectionResult result = select_effects_of(evidence, Machine(), all, {}, {});
+  const std::string found = names(result, all);
+  EXPECT_TRUE(found == "X.scale_error geometry.squareness" ||
+              found == "geometry.squareness X.scale_error")
+      << found;
+  EXPECT_NEAR(number_of(result.found.machine, "effects.X.scale_error.error_ppm"), -40, 0.5);
+  EXPECT_NEAR(number_of(result.found.machine, "effects.geometry.squareness.xy_urad"), 60, 0.5);
+}
+
 TEST(Selection, WhatIsFoundIsNotKnownWellEnoughForAnEffectBehindIt) {
   Record record = toy::commands(1000, 4);
   const double little = 6;  // 0.05 % of the chi-square
