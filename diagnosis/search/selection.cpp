@@ -315,14 +315,15 @@ class Search {
           also_fitted_.emplace_back(fitted_with(now, *other, {}, far_more_than(trial)));
       const double more = std::max(1.0, 1.0 + static_cast<double>(other->numbers.size()) -
                                             static_cast<double>(chosen->numbers.size()));
-      const bool of_one_kind = other->released.empty() == contenders[than].released.empty();
-      const double clearly = std::max(more * options_.class_gain,
-                                      of_one_kind ? kHalf * rules_.excess(trial.held_out) : 0);
       const double counts = counted_within(instead, contest), band = contest.band_of(other->gain);
+      // Of one kind, it must explain half of what the present one leaves.
+      const bool far_better =
+          other->released.empty() != chosen->released.empty() ||
+          trial.held_out - instead.held_out >= kHalf * rules_.excess(trial.held_out);
       const bool simpler = !other->released.empty() && counts > present - band &&
                            contest.intricacy(*other) + (present - counts) / band <
                                contest.intricacy(*chosen) - kClearlySimpler;
-      if (!simpler && counts < present + clearly) continue;
+      if (!simpler && !(far_better && counts >= present + more * options_.class_gain)) continue;
       if (!holds_up(instead) || !is_certain(instead)) continue;
       present = counts;
       trial = std::move(instead);
@@ -339,9 +340,6 @@ class Search {
     evidence_.anchor(m.machine);
     return counts;
   }
-
-  /// What counts of the gain of a machine that came out of a contest.
-  double counted(const FittedMachine& m, const Contest& contest) const { return contest.counts(m); }
 
   /// With a contender, everything fitted together.
   FittedMachine fitted_with(const FittedMachine& now, const Contender& contender,
