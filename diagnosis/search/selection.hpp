@@ -4,6 +4,7 @@
 //   repeat
 //     screen                 every candidate, by sensitivities (screening.hpp)
 //     refit                  the best few nonlinearly (refit.hpp); pairs where no one explains half
+//                            or the best one has many numbers
 //     accept                 the one with the largest gain on held-out laps, if it is enough
 //     converge, drop test    all together; what is no longer needed goes
 //     exchange               each one taken out, all candidates and declared numbers compete
