@@ -208,7 +208,7 @@ std::vector<Candidate> candidates_of(const DiagnoseOptions& options, const Recor
   all = suspected(std::move(all), numbers, options.suspects);
   std::erase_if(all, [&](const Candidate& c) { return is_unrecorded_axis(c.place, record); });
   // About one place an axis that turns as it goes looks out of square and of another scale.
-  if (record.bar && options.suspects.empty())
+  if (record.on_table && record.on_table->is_bar() && options.suspects.empty())
     std::erase_if(all, [](const Candidate& c) { return c.effect == "angular_errors"; });
   return all;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <tuple>
 
@@ -68,6 +69,7 @@ std::vector<Dimension> dimensions(ColumnKind kind, bool rotary) {
       return {rotary ? Dimension::torque : Dimension::force};
     case ColumnKind::deflection:
     case ColumnKind::bar:
+    case ColumnKind::tool_position:
       return {Dimension::length};
     case ColumnKind::cosine:
     case ColumnKind::sine:
@@ -86,8 +88,10 @@ std::vector<Dimension> dimensions(ColumnKind kind, bool rotary) {
   return {rotary ? Dimension::angle : Dimension::length};
 }
 
+bool of_table(ColumnKind kind) { return kind == ColumnKind::tool_position; }
 bool of_probe(ColumnKind kind) {
-  return kind == ColumnKind::deflection || kind == ColumnKind::cosine || kind == ColumnKind::sine;
+  return kind == ColumnKind::deflection || kind == ColumnKind::cosine || kind == ColumnKind::sine ||
+         of_table(kind);
 }
 bool of_nothing(ColumnKind kind) {
   return kind == ColumnKind::temperature || kind == ColumnKind::clock || kind == ColumnKind::bar;
@@ -152,12 +156,12 @@ void check_unit(const ImportMap& map, const ImportMap::Signal& s, const Refusal&
   const std::vector<Dimension> may = dimensions(s.kind, place.rotary);
   std::string allowed;
   for (const Dimension d : may) allowed += (allowed.empty() ? "" : ", ") + measured_units(d);
-  const std::string subject =
-      of_nothing(s.kind)
-          ? fmt::format("a {}", to_string(s.kind))
-          : fmt::format("the {} of {}", to_string(s.kind),
-                        of_probe(s.kind) ? "the probe"
-                                         : (place.rotary ? "a rotary axis" : "a linear axis"));
+  const std::string subject = of_nothing(s.kind) ? fmt::format("a {}", to_string(s.kind))
+                                                 : fmt::format("the {} of {}", to_string(s.kind),
+                                                               of_table(s.kind)   ? "the tool"
+                                                               : of_probe(s.kind) ? "the probe"
+                                                               : place.rotary     ? "a rotary axis"
+                                                                              : "a linear axis");
   const std::string tail = fmt::format("allowed for {}: {}", subject, allowed);
   if (s.unit.empty()) refuse("unit", "is missing; " + tail);
   const MeasuredUnit* unit = find_measured_unit(s.unit);
@@ -185,8 +189,8 @@ void check_axes(const ImportMap& map, const std::string& name) {
     const Refusal refuse(name, "axes.", a.lines);
     if (a.name.empty()) refuse("name", "is missing");
     if (!contains(kAxisNames, a.place) && !contains(kProbeNames, a.place))
-      refuse("place", fmt::format("\"{}\" is no place; allowed X, Y, Z, A, C, or x, y, z of the "
-                                  "probe",
+      refuse("place", fmt::format("\"{}\" is no place; allowed X, Y, Z, A, C, or x, y, z of "
+                                  "probe or table",
                                   a.place));
     if (contains(kAxisNames, a.name) && a.name != a.place)
       refuse("name", fmt::format("\"{}\" is the name of another axis of the machine file", a.name));
@@ -228,11 +232,29 @@ void check_laps(const ImportMap& map, const std::string& name) {
   }
 }
 
+/// A record holds the readings of one device.
+void check_devices(const ImportMap& map, const std::string& name) {
+  std::optional<ColumnKind> first;
+  for (const ImportMap::Signal& s : map.signals) {
+    if (!contains(std::array{ColumnKind::deflection, ColumnKind::bar, ColumnKind::tool_position},
+                  s.kind))
+      continue;
+    if (first && *first != s.kind)
+      Refusal(name, "signals.", s.lines)(
+          "kind", fmt::format("a {} was read as well; a record holds one or the other",
+                              *first == ColumnKind::deflection ? "probe" : to_string(*first)));
+    first = s.kind;
+  }
+  const ImportMap::ToolPosition& of = map.tool_position;
+  const Refusal refuse(name, "tool_position.", of.lines);
+  if (first == ColumnKind::tool_position && !of.lines.contains("zero_mm"))
+    refuse("zero_mm", "is missing; columns of kind tool_position need where they read 0");
+  if (first != ColumnKind::tool_position && of.lines.contains("zero_mm"))
+    refuse("zero_mm", "no column is of kind tool_position");
+}
+
 void check_bar(const ImportMap& map, const std::string& name) {
   const auto is_bar = [](const ImportMap::Signal& s) { return s.kind == ColumnKind::bar; };
-  const auto is_deflection = [](const ImportMap::Signal& s) {
-    return s.kind == ColumnKind::deflection;
-  };
   const auto column = std::find_if(map.signals.begin(), map.signals.end(), is_bar);
   const Refusal refuse(name, "bar.", map.bar.lines);
   if (column == map.signals.end()) {
@@ -241,9 +263,6 @@ void check_bar(const ImportMap& map, const std::string& name) {
       Refusal(name, "arcs.", map.arcs.front().lines)("", "no column is of kind bar");
     return;
   }
-  if (std::any_of(map.signals.begin(), map.signals.end(), is_deflection))
-    Refusal(name, "signals.", column->lines)(
-        "kind", "a probe was read as well; a record holds one or the other");
   if (!(map.bar.radius > 0))
     refuse("radius_mm", "is missing; a column of kind bar needs the nominal length of the bar");
   if (!map.bar.lines.contains("centre_mm"))
@@ -276,8 +295,8 @@ void check_signal(const ImportMap& map, const ImportMap::Signal& s, const Refusa
   if (!s.lines.contains("kind"))
     refuse("kind",
            "is missing; allowed command, position, motor_position, load_position, twist, "
-           "velocity, force, applied_force, added_force, deflection, bar, cosine, sine, "
-           "temperature, clock");
+           "velocity, force, applied_force, added_force, deflection, bar, tool_position, cosine, "
+           "sine, temperature, clock");
   if (s.sign == 0) refuse("sign", "0 is not possible, allowed 1 or -1");
   if (s.scale == 0) refuse("scale", "0 would make every value the same");
   if (of_nothing(s.kind)) {
@@ -293,7 +312,9 @@ void check_signal(const ImportMap& map, const ImportMap::Signal& s, const Refusa
   if (!fits)
     refuse("axis",
            fmt::format("\"{}\" is no axis that has a {}; allowed {}{}", s.axis, to_string(s.kind),
-                       of_probe(s.kind) ? "x, y, z of the probe" : "X, Y, Z, A, C",
+                       of_table(s.kind)   ? "x, y, z of the table"
+                       : of_probe(s.kind) ? "x, y, z of the probe"
+                                          : "X, Y, Z, A, C",
                        own_names(map, s.kind)));
 }
 
@@ -378,6 +399,8 @@ std::string_view to_string(ImportMap::Kind kind) {
       return "deflection";
     case ColumnKind::bar:
       return "bar";
+    case ColumnKind::tool_position:
+      return "tool_position";
     case ColumnKind::cosine:
       return "cosine";
     case ColumnKind::sine:
@@ -411,6 +434,7 @@ void check_import_map(const ImportMap& map, const std::string& name) {
   check_time(map, name);
   check_signals(map, name);
   check_laps(map, name);
+  check_devices(map, name);
   check_bar(map, name);
 }
 

@@ -58,6 +58,7 @@ struct ImportMap {
     added_force,     ///< known, added by the controller to its demand: part of force
     deflection,      ///< of the probe
     bar,             ///< length of a ball bar less its nominal one
+    tool_position,   ///< of the tool centre in the frame of the table
     cosine,          ///< raw signal of the probe or of an encoder
     sine,
     temperature,
@@ -87,15 +88,15 @@ struct ImportMap {
 
   struct Axis {
     std::string name;   ///< what the user calls it
-    std::string place;  ///< X Y Z A C of the machine file, x y z of the probe
+    std::string place;  ///< X Y Z A C of the machine file, x y z of probe and table
     KeyLines lines;
 
     template <class Self, class Visit>
     static void fields(Self& p, Visit& visit) {
       visit("name", p.name, "what the signals call it, e.g. \"carriage\", \"joint 2\"");
       visit("place", p.place,
-            "its axis in the machine file: X, Y, Z (linear), A, C (rotary), or x, y, z of the "
-            "probe");
+            "its axis in the machine file: X, Y, Z (linear), A, C (rotary), or x, y, z of probe "
+            "or table");
       if constexpr (requires { visit.lines(p.lines); }) visit.lines(p.lines);
     }
   };
@@ -127,12 +128,13 @@ struct ImportMap {
                     {"added_force", Kind::added_force},
                     {"deflection", Kind::deflection},
                     {"bar", Kind::bar},
+                    {"tool_position", Kind::tool_position},
                     {"cosine", Kind::cosine},
                     {"sine", Kind::sine},
                     {"temperature", Kind::temperature},
                     {"clock", Kind::clock}},
                    "what it is; position: by the measuring system the loop is closed with");
-      visit("axis", p.axis, "X, Y, Z, A, C; x, y, z of the probe; or a name of `axes`");
+      visit("axis", p.axis, "X, Y, Z, A, C; x, y, z of probe or table; or a name of `axes`");
       visit("unit", p.unit, "unit of the column, after scale");
       visit("scale", p.scale, Unit{"", 1}, Range{-1e12, 1e12},
             "units per one of the column, e.g. newtons per volt or metres per count");
@@ -178,6 +180,19 @@ struct ImportMap {
     }
   };
 
+  /// What sees where the tool is against the table: grid encoder, R-test.
+  struct ToolPosition {
+    Vec3 zero = Vec3::Zero();  ///< X, Y, Z of the machine at which it reads nought [m]
+    KeyLines lines;
+
+    template <class Self, class Visit>
+    static void fields(Self& p, Visit& visit) {
+      visit("zero_mm", p.zero, unit::mm, Range{-1e5, 1e5},
+            "machine coordinates X, Y, Z at which it reads 0, with rotary axes as the run begins");
+      if constexpr (requires { visit.lines(p.lines); }) visit.lines(p.lines);
+    }
+  };
+
   /// What a bar was read on, where no commands were recorded.
   struct Arc {
     double from = 0;         ///< [s] in the time of the table
@@ -210,6 +225,7 @@ struct ImportMap {
   std::vector<Lap> laps;
   Bar bar;
   std::vector<Arc> arcs;
+  ToolPosition tool_position;
   KeyLines lines;
 
   template <class Self, class Visit>
@@ -236,6 +252,8 @@ struct ImportMap {
     visit.list("laps", p.laps, "the parts of the run that count");
     visit.group("bar", p.bar, "where a ball bar was, for a column of kind bar");
     visit.list("arcs", p.arcs, "what it was read on at constant feed, instead of commands");
+    visit.group("tool_position", p.tool_position,
+                "where a grid encoder or an R-test was, for columns of kind tool_position");
     if constexpr (requires { visit.lines(p.lines); }) visit.lines(p.lines);
   }
 };
@@ -245,7 +263,7 @@ std::string_view to_string(ImportMap::Kind kind);
 /// Where a signal belongs in a record.
 struct SignalPlace {
   std::size_t axis = 0;
-  bool probe = false;   ///< axis counts x, y, z of the probe
+  bool probe = false;   ///< axis counts x, y, z of the probe, or of the table
   bool rotary = false;  ///< of an axis
 };
 

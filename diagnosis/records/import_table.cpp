@@ -52,7 +52,9 @@ class Importer {
           fmt::format("{}: {} samples are too short a run; at least {} are "
                       "needed",
                       table_.source, base_.samples, kFewestSamples));
-    if (map_.bar.radius > 0) record_.bar = {map_.bar.centre, map_.bar.radius};
+    if (map_.bar.radius > 0) record_.on_table = {map_.bar.centre, map_.bar.radius};
+    if (map_.tool_position.lines.contains("zero_mm"))
+      record_.on_table = {map_.tool_position.zero, 0};
     if (map_.arcs.empty())
       for (const ImportMap::Signal& s : map_.signals) add(s);
     else
@@ -230,6 +232,9 @@ class Importer {
         break;
       case Kind::bar:
         signal.kind = SignalKind::bar;
+        break;
+      case Kind::tool_position:
+        signal.kind = SignalKind::tool_position;
         break;
       case Kind::cosine:
         signal.kind = SignalKind::cosine;

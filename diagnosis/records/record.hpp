@@ -30,6 +30,7 @@ enum class SignalKind {
   added_force,    ///< known part of the drive's force that its loops did not ask for [N or N m]
   deflection,     ///< of the probe, one component in the probe's frame [m]
   bar,            ///< length of a ball bar less its nominal one [m]
+  tool_position,  ///< of the tool centre, one component in the frame of the table [m]
   cosine,         ///< raw signal of one probe channel or encoder [V, or share of the converter]
   sine,           ///< as cosine
   temperature,    ///< [K]
@@ -38,7 +39,7 @@ enum class SignalKind {
 
 /// Whether it says where the tool is against the piece.
 constexpr bool is_reading(SignalKind q) {
-  return q == SignalKind::deflection || q == SignalKind::bar;
+  return q == SignalKind::deflection || q == SignalKind::bar || q == SignalKind::tool_position;
 }
 
 constexpr bool is_compared(SignalKind q) {
@@ -46,18 +47,21 @@ constexpr bool is_compared(SignalKind q) {
          is_reading(q);
 }
 
-/// A ball bar: a ball on the table and one in the spindle, and what measures their distance.
-struct BallBar {
-  Vec3 centre = Vec3::Zero();  ///< X, Y, Z at which one ball would be in the other [m]
-  double length = 0;           ///< nominal distance [m]
+/// What is on the table in place of a piece that a probe touches: one ball of a bar whose other one
+/// is in the spindle, or a sensor that sees where the tool centre is (grid encoder, R-test).
+struct OnTable {
+  Vec3 zero =
+      Vec3::Zero();       ///< X, Y, Z with the tool centre at the ball, or at the sensor's zero [m]
+  double bar_length = 0;  ///< nominal distance of the balls [m]; 0: a sensor
 
-  bool operator==(const BallBar&) const = default;
+  bool is_bar() const { return bar_length > 0; }
+  bool operator==(const OnTable&) const = default;
 };
 
 /// One signal of a record.
 struct MeasuredSignal {
   SignalKind kind = SignalKind::position;
-  std::size_t axis = 0;       ///< of the machine; of a deflection: 0, 1, 2 for x, y, z
+  std::size_t axis = 0;       ///< of the machine; of probe and tool: 0, 1, 2 for x, y, z
   std::string source;         ///< its name where it came from, for messages
   std::vector<double> value;  ///< SI; NaN: missing
   double resolution = 0;      ///< step in which its values come, 0: none was found
@@ -79,9 +83,9 @@ struct Record {
   std::vector<Stretch> stretches;     ///< in order of time, not overlapping
   std::vector<std::string> warnings;  ///< one sentence each
 
-  std::string machine_toml;    ///< declared machine told by the run itself; empty: none
-  std::string piece_toml;      ///< piece in the machine; empty: none
-  std::optional<BallBar> bar;  ///< where a bar was read; else a probe on the piece
+  std::string machine_toml;         ///< declared machine told by the run itself; empty: none
+  std::string piece_toml;           ///< piece in the machine; empty: none
+  std::optional<OnTable> on_table;  ///< what was read; none: a probe on the piece
 
   std::size_t samples() const { return signals.empty() ? 0 : signals.front().value.size(); }
   /// Null where there is none.

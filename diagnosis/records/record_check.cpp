@@ -221,7 +221,7 @@ class Checker {
       const bool raw = s.kind == SignalKind::cosine || s.kind == SignalKind::sine;
       if (is_compared(s.kind) || raw) ++compared, still += is_constant;
       const bool told = s.kind == SignalKind::applied_force || s.kind == SignalKind::added_force;
-      const bool stands = record_.bar && s.kind == SignalKind::command;  // across the bar's plane
+      const bool stands = record_.on_table && s.kind == SignalKind::command;  // across its plane
       if (is_constant && s.kind != SignalKind::temperature && !told && !stands)
         warn(fmt::format("{} is constant; nothing can be learnt from it", name(s)));
       if (told && !record_.find(SignalKind::command, s.axis) && !is_followed(record_, s.axis))

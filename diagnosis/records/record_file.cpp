@@ -17,7 +17,7 @@ using namespace hdf5;  // NOLINT: this file is written in its terms
 namespace {
 
 constexpr const char* kRecordFormat = "vcnc-record";
-constexpr std::int64_t kRecordVersion = 1;
+constexpr std::int64_t kRecordVersion = 2;
 constexpr std::int64_t kMostSignals = 1000;
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& reason) {
@@ -37,18 +37,18 @@ bool write_signal(hid_t file, std::size_t i, const MeasuredSignal& s) {
          H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, s.value.data()) >= 0;
 }
 
-bool write_bar(hid_t file, const std::optional<BallBar>& bar) {
-  return !bar ||
-         (write(file, "bar_length_m", bar->length) && write(file, "bar_x_m", bar->centre.x()) &&
-          write(file, "bar_y_m", bar->centre.y()) && write(file, "bar_z_m", bar->centre.z()));
+bool write_on_table(hid_t file, const std::optional<OnTable>& it) {
+  return !it ||
+         (write(file, "bar_length_m", it->bar_length) && write(file, "zero_x_m", it->zero.x()) &&
+          write(file, "zero_y_m", it->zero.y()) && write(file, "zero_z_m", it->zero.z()));
 }
 
-std::optional<BallBar> read_bar(hid_t file) {
-  BallBar bar;
-  const bool there = read(file, "bar_length_m", bar.length) &&
-                     read(file, "bar_x_m", bar.centre.x()) &&
-                     read(file, "bar_y_m", bar.centre.y()) && read(file, "bar_z_m", bar.centre.z());
-  return there ? std::optional(bar) : std::nullopt;
+std::optional<OnTable> read_on_table(hid_t file) {
+  OnTable it;
+  const bool there = read(file, "bar_length_m", it.bar_length) &&
+                     read(file, "zero_x_m", it.zero.x()) && read(file, "zero_y_m", it.zero.y()) &&
+                     read(file, "zero_z_m", it.zero.z());
+  return there ? std::optional(it) : std::nullopt;
 }
 
 std::string one_line(std::string text) {
@@ -117,7 +117,7 @@ void write_record(const Record& record, const std::filesystem::path& path) {
               write(file, "machine_toml", record.machine_toml) &&
               write(file, "piece_toml", record.piece_toml) &&
               write(file, "stretches", stretches_text(record)) &&
-              write(file, "warnings", warnings) && write_bar(file, record.bar);
+              write(file, "warnings", warnings) && write_on_table(file, record.on_table);
     for (std::size_t i = 0; written && i < record.signals.size(); ++i)
       written = write_signal(file, i, record.signals[i]);
     written = H5Fclose(file.release()) >= 0 && written;
@@ -156,9 +156,14 @@ Record read_record(const std::filesystem::path& path) {
     sound = read_signal(file, static_cast<std::size_t>(i), record.signals.emplace_back(), size);
     sound = sound && record.signals.back().value.size() == record.samples();
   }
-  record.bar = read_bar(file);
-  const bool has_bar = record.find(SignalKind::bar, 0) != nullptr;
-  if (!sound || has_bar != record.bar.has_value() || !read_stretches(stretches, record))
+  record.on_table = read_on_table(file);
+  const auto has = [&](SignalKind kind) {
+    return std::any_of(record.signals.begin(), record.signals.end(),
+                       [&](const MeasuredSignal& s) { return s.kind == kind; });
+  };
+  const std::optional<OnTable>& it = record.on_table;
+  if (!sound || has(SignalKind::bar) != (it && it->is_bar()) ||
+      has(SignalKind::tool_position) != (it && !it->is_bar()) || !read_stretches(stretches, record))
     refuse(path, "the record is damaged");
   std::istringstream lines(warnings);
   for (std::string line; std::getline(lines, line);) record.warnings.push_back(line);

@@ -4,7 +4,9 @@
 //                               ("position"), axis (0 .. 4), source, resolution
 //   / attributes                format "vcnc-record", format_version, signals, source, period_s,
 //                               begin_s, machine_toml, piece_toml; stretches (a line each: begin
-//                               end condition repetition label), warnings (a line each)
+//                               end condition repetition label), warnings (a line each); of what is
+//                               on the table bar_length_m (0: a sensor), zero_x_m, zero_y_m,
+//                               zero_z_m
 #pragma once
 
 #include <filesystem>

@@ -7,7 +7,7 @@ namespace vcnc {
 
 namespace {
 
-constexpr std::array<std::pair<SignalKind, std::string_view>, 12> kKindNames{{
+constexpr std::array<std::pair<SignalKind, std::string_view>, 13> kKindNames{{
     {SignalKind::command, "command"},
     {SignalKind::position, "position"},
     {SignalKind::twist, "twist"},
@@ -16,6 +16,7 @@ constexpr std::array<std::pair<SignalKind, std::string_view>, 12> kKindNames{{
     {SignalKind::added_force, "added force"},
     {SignalKind::deflection, "deflection"},
     {SignalKind::bar, "ball bar"},
+    {SignalKind::tool_position, "tool position"},
     {SignalKind::cosine, "cosine"},
     {SignalKind::sine, "sine"},
     {SignalKind::temperature, "temperature"},
@@ -39,10 +40,10 @@ std::optional<SignalKind> signal_kind(std::string_view name) {
 std::string signal_name(SignalKind kind, std::size_t axis) {
   if (kind == SignalKind::temperature || kind == SignalKind::clock || kind == SignalKind::bar)
     return std::string(to_string(kind));
-  const bool probe =
-      kind == SignalKind::deflection || kind == SignalKind::cosine || kind == SignalKind::sine;
-  const std::string place =
-      probe ? std::string(1, static_cast<char>('x' + axis % 3)) : std::string(kAxisNames.at(axis));
+  const bool own_frame = kind == SignalKind::deflection || kind == SignalKind::tool_position ||
+                         kind == SignalKind::cosine || kind == SignalKind::sine;
+  const std::string place = own_frame ? std::string(1, static_cast<char>('x' + axis % 3))
+                                      : std::string(kAxisNames.at(axis));
   return std::string(to_string(kind)) + " " + place;
 }
 

@@ -75,6 +75,11 @@ std::vector<ComparedChannel> channels_of(const Record& record, const CommandedMo
   return channels;
 }
 
+SignalKind reading_kind(const Record& record) {
+  if (!record.on_table) return SignalKind::deflection;
+  return record.on_table->is_bar() ? SignalKind::bar : SignalKind::tool_position;
+}
+
 /// Of a drive that goes where its axis was measured, more closely than any that is recorded: its
 /// loops cross over as high as keeps them stable with what turns at the motor alone.
 ServoParams follower(const MechanicsParams& m) {
@@ -176,12 +181,11 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
   known_ = motion.known;
   motion_ = at_cycles(motion, period_);
   for (std::size_t c = 0; c < measured_.size(); ++c)
-    if (const MeasuredSignal* signal =
-            record.find(record.bar ? SignalKind::bar : SignalKind::deflection, c))
+    if (const MeasuredSignal* signal = record.find(reading_kind(record), c))
       measured_[c] = at_cycles(signal->value, period_, motion_.known.size());
   if (piece) piece_ = make_piece(*piece);
   against_.piece = piece_.get();
-  if (record.bar) hold_against(*record.bar);
+  if (record.on_table) hold_against(*record.on_table);
   for (auto& memory : axis_memory_) memory = std::make_unique<Memory<AxisReplay>>(kAxisReplays);
   for (auto& memory : watched_) memory = std::make_unique<Memory<WatchedReplay>>(kWatched);
   pose_memory_ = std::make_unique<Memory<Poses>>(kPoses);
@@ -191,24 +195,23 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
 
 MachineReplica::~MachineReplica() = default;
 
-/// The ball on the table is where the tool is when the axes bring one ball into the other, the
-/// rotary ones as they begin.
-void MachineReplica::hold_against(const BallBar& bar) {
+/// Where the tool is when the linear axes bring it there, the rotary ones as they begin.
+void MachineReplica::hold_against(const OnTable& it) {
   AxisVector stands;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     stands[axis] = declared_.axes[axis].limits.start;
   AxisVector q = motion_.start(stands);
   std::vector<std::size_t> still;
   for (const std::size_t axis : {kX, kY, kZ}) {
-    q[axis] = bar.centre[static_cast<Eigen::Index>(axis)];
+    q[axis] = it.zero[static_cast<Eigen::Index>(axis)];
     const std::vector<double>& x = motion_.position[axis];
     const auto [low, high] = std::minmax_element(x.begin(), x.end());
     if (x.empty() || *high - *low < kStill) still.push_back(axis);
   }
   const Kinematics kinematics(declared_.kinematics, declared_.probe.length,
                               declared_.setup.work_offset[0]);
-  against_.bar = {kinematics.forward(q).p_WT, bar.length};
-  if (still.size() == 1)
+  against_.on_table = {kinematics.forward(q).p_WT, it.bar_length};
+  if (it.is_bar() && still.size() == 1)
     across_ = kinematics.jacobian(q).col(static_cast<Eigen::Index>(still.front())).normalized();
 }
 

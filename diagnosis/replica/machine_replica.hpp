@@ -91,7 +91,7 @@ class MachineReplica : public Replica {
   AxisReplay replayed(const Hypothesis& hypothesis, std::size_t axis) const;
   void sample_as_recorded(AxisReplay& replay) const;
   Prediction predict(const Hypothesis& hypothesis, const AxisReplays& axes) const;
-  void hold_against(const BallBar& bar);
+  void hold_against(const OnTable& it);
   bool knows_forces() const;  ///< of some axis, by apply()
   Prediction assembled(const AxisReplays& axes, const Deflections& reading) const;
   Deflections off_record(const Deflections& reading) const;

@@ -51,6 +51,7 @@ ShownUnit shown_unit(const ComparedChannel& channel) {
     case SignalKind::sine:
       return {"mV", 1e3};
     case SignalKind::deflection:
+    case SignalKind::tool_position:
       return {"um", 1e6};
     default:
       return rotary ? ShownUnit{"arcsec", 3600 / kDegree} : ShownUnit{"um", 1e6};

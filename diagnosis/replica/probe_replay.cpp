@@ -134,17 +134,22 @@ class CoarseContact {
   double clearance_ = 0;
 };
 
-/// What a bar reads, in the first channel.
+/// What a bar reads, in the first channel, or a sensor.
 template <class PosesOfCycles>
-Deflections bar_readings(const Machine& actual, const Counterpart::Bar& bar, PosesOfCycles& poses) {
+Deflections table_readings(const Machine& actual, const Counterpart::OnTable& of,
+                           PosesOfCycles& poses) {
   Chain<TouchPort> effects = machine_chain<TouchPort>(actual.effects, kProbeSeed);
   Deflections reading;
   for (std::vector<double>& r : reading) r.assign(poses.size(), 0.0);
   for (std::size_t k = 0; k < poses.size(); ++k) {
+    const Vec3 p = poses[k].p_WT - of.p_W0;
+    if (!(of.bar_length > 0)) {
+      for (std::size_t c = 0; c < 3; ++c) reading[c][k] = p[static_cast<Eigen::Index>(c)];
+      continue;
+    }
     TouchPort::Signal<double> ball{.radius = actual.probe.ball_radius};
     effects.step(ball, {.moment = moment_of(k)});  // its balls are held, not felt on one side
-    const double distance = (poses[k].p_WT - bar.p_WB).norm();
-    reading[0][k] = distance - bar.length + ball.radius - actual.probe.ball_radius;
+    reading[0][k] = p.norm() - of.bar_length + ball.radius - actual.probe.ball_radius;
   }
   return reading;
 }
@@ -209,9 +214,9 @@ void add_effects(Fingerprint& print, const Machine& actual, EffectStage stage) {
 
 ProbeReplay replay_probe(const Machine& actual, const Counterpart& against,
                          const AxisReplays& axes) {
-  if (against.bar) {
+  if (against.on_table) {
     const Poses poses = replay_poses(actual, axes);
-    ProbeReplay replay{bar_readings(actual, *against.bar, poses), {}};
+    ProbeReplay replay{table_readings(actual, *against.on_table, poses), {}};
     replay.reading = replay_sensing(actual, replay.ball, axes);
     return replay;
   }
@@ -298,7 +303,7 @@ const ToolPose& NearbyPoses::Course::operator[](std::size_t k) {
 
 Deflections replay_contact(const Machine& actual, const Counterpart& against,
                            NearbyPoses::Course poses) {
-  if (against.bar) return bar_readings(actual, *against.bar, poses);
+  if (against.on_table) return table_readings(actual, *against.on_table, poses);
   Deflections ball;
   for (std::vector<double>& b : ball) b.resize(poses.size());
   CoarseContact contact(actual, against.piece);

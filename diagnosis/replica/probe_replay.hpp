@@ -16,12 +16,14 @@
 // converter and without counting: nothing slips. Where signals are corrected online, the
 // correction sees its samples of 100 us on straight lines between cycles, until it has its ellipse.
 //
-// A ball bar in place of the probe has no motion of its own: its reading, in the first channel, is
+// What measures between table and tool in place of the probe has no motion of its own. A ball bar
+// reads, in the first channel,
 //
 //   d = |p_WT - p_WB| - L + r_b - r_0
 //
 // p_WB the ball on the table, L the nominal length, r_b - r_0 what the ball is larger than declared
-// (TouchPort), which for a bar is the error of its zero. Then it is sensed like a deflection.
+// (TouchPort), which for a bar is the error of its zero. A sensor on the table reads p_WT - p_W0 in
+// three channels, p_W0 where it reads zero. Then both are sensed like a deflection.
 //
 // Neglected against the full probe: motion of the tool within 1 ms other than even, quantisation by
 // the converter (0.13 nm), and what only fingerprint_of_full_probe() names. What is left cancels in
@@ -45,14 +47,14 @@ using AxisReplays = PerAxis<std::shared_ptr<const AxisReplay>>;
 /// x, y, z in the probe frame, one value per cycle [m].
 using Deflections = std::array<std::vector<double>, 3>;
 
-/// What the tool is held against: a piece by a probe, or the ball on the table by a bar.
+/// What the tool is held against: a piece by a probe, or what else is on the table.
 struct Counterpart {
-  struct Bar {
-    Vec3 p_WB = Vec3::Zero();  ///< the ball on the table [m]
-    double length = 0;         ///< nominal [m]
+  struct OnTable {
+    Vec3 p_W0 = Vec3::Zero();  ///< the ball of a bar, or where a sensor reads zero [m]
+    double bar_length = 0;     ///< nominal [m]; 0: a sensor
   };
   const Piece* piece = nullptr;  ///< null: nothing is touched
-  std::optional<Bar> bar;
+  std::optional<OnTable> on_table;
 };
 
 struct ProbeReplay {

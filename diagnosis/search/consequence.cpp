@@ -23,6 +23,31 @@ Difference difference(const Evidence& evidence, const Prediction& a, const Predi
   return d;
 }
 
+/// Sum of squares of what a tool position changes by across the way it goes, or at all where it
+/// stands.
+Difference across_the_way(const Evidence& evidence, const Prediction& a, const Prediction& b,
+                          const std::vector<std::size_t>& components) {
+  constexpr std::size_t kReach = 5;      // samples to either side
+  constexpr double kStandsBelow = 1e-3;  // [m/s]
+  const double least = 2 * kReach * evidence.record().period * kStandsBelow;
+  Difference d;
+  for (const RecordBlock& block : evidence.partition().blocks)
+    for (std::size_t k = block.begin + kReach; k + kReach < block.end; ++k) {
+      Vec3 by = Vec3::Zero(), way = Vec3::Zero();
+      for (std::size_t i = 0; i < components.size(); ++i) {
+        const std::vector<double>&x = a[components[i]], &y = b[components[i]];
+        const auto at = static_cast<Eigen::Index>(i);
+        by[at] = x[k] - y[k];
+        way[at] = y[k + kReach] - y[k - kReach];
+      }
+      if (!by.allFinite() || !way.allFinite()) continue;
+      if (way.norm() > least) by -= way * (by.dot(way) / way.squaredNorm());
+      d.sum += by.squaredNorm();
+      d.n += 1;
+    }
+  return d;
+}
+
 }  // namespace
 
 Consequence consequence(const Evidence& evidence, const Prediction& a, const Prediction& b) {
@@ -31,9 +56,11 @@ Consequence consequence(const Evidence& evidence, const Prediction& a, const Pre
                                   [](const auto& c) { return is_reading(c.kind); });
   Consequence of;
   double sum = 0, n = 0;  // of the contour
+  std::vector<std::size_t> tool;
   for (std::size_t c = 0; c < channels.size(); ++c) {
     const Difference d = difference(evidence, a, b, c);
     const bool reading = is_reading(channels[c].kind);
+    if (channels[c].kind == SignalKind::tool_position) tool.push_back(c);
     const bool contour =
         probed ? reading : channels[c].kind == SignalKind::position && !is_rotary(channels[c].axis);
     if (contour) {
@@ -45,6 +72,11 @@ Consequence consequence(const Evidence& evidence, const Prediction& a, const Pre
     const double share = std::sqrt(d.sum / d.n) / noise;
     of.of_noise = std::max(of.of_noise, share);
     if (!reading) of.of_noise_but_readings = std::max(of.of_noise_but_readings, share);
+  }
+  if (!tool.empty()) {
+    const Difference d = across_the_way(evidence, a, b, tool);
+    sum = d.sum;
+    n = d.n;
   }
   if (n > 0) of.contour_um = std::sqrt(sum / n) * 1e6;
   return of;

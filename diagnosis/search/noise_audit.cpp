@@ -259,6 +259,7 @@ double exactness(const ComparedChannel& channel, const Series& residual) {
       return is_rotary(channel.axis) ? 5e-9 : 1e-9;
     case SignalKind::deflection:
     case SignalKind::bar:
+    case SignalKind::tool_position:
       return 5e-9;
     default:
       break;

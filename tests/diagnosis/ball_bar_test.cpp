@@ -88,7 +88,7 @@ Effect effect(const std::string& plane, const std::string& key, double value) {
                                             : kY;
   const auto from_centre = [&](std::size_t axis, std::size_t k) {
     return run.find(SignalKind::command, axis)->value[k] -
-           run.bar->centre[static_cast<Eigen::Index>(axis)];
+           run.on_table->zero[static_cast<Eigen::Index>(axis)];
   };
   for (std::size_t k = 0; k < run.samples(); ++k) {
     if (!std::isfinite(run.find(SignalKind::bar, 0)->value[k])) continue;
@@ -172,8 +172,8 @@ TEST(BallBar, IsInTheFileOfARecord) {
   const Record written = record(1);
   write_record(written, file);
   const Record back = read_record(file);
-  ASSERT_TRUE(back.bar.has_value());
-  EXPECT_EQ(*back.bar, *written.bar);
+  ASSERT_TRUE(back.on_table.has_value());
+  EXPECT_EQ(*back.on_table, *written.on_table);
   ASSERT_NE(back.find(SignalKind::bar, 0), nullptr);
   EXPECT_EQ(back.find(SignalKind::command, kX)->value,
             written.find(SignalKind::command, kX)->value);
@@ -204,7 +204,7 @@ TEST(BallBar, RefusesWithKeyAndReason) {
        "arcs.from_s: from 90.000 to 96.283 s there are 0 of"},
       {std::string(kSound) + "[[signals]]\ncolumn = \"x\"\nkind = \"deflection\"\naxis = \"x\"\n"
                              "unit = \"um\"\n",
-       "signals.kind: a probe was read as well"},
+       "signals.kind: a bar was read as well"},
       {std::string(kSound) + arc(0, 0, 360) +
            "[[signals]]\ncolumn = \"x\"\nkind = \"command\"\naxis = \"X\"\nunit = \"mm\"\n",
        "signals.kind: with arcs the bar alone can be read, no command"},

@@ -120,6 +120,14 @@ def fault(text):
     return name, place, {parameter: float(value)}
 
 
+def merged(faults):
+    """Parameters of one effect at one place, together."""
+    of = {}
+    for name, place, parameters in faults:
+        of.setdefault((name, place), {}).update(parameters)
+    return [(name, place, parameters) for (name, place), parameters in of.items()]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("out", type=pathlib.Path)
@@ -129,11 +137,7 @@ def main():
     parser.add_argument("--radius", type=float, default=100, help="mm")
     parser.add_argument("--feed", type=float, default=3000, help="mm/min")
     a = parser.parse_args()
-    merged = {}
-    for name, place, parameters in a.fault:
-        merged.setdefault((name, place), {}).update(parameters)
-    faults = [(name, place, parameters) for (name, place), parameters in merged.items()]
-    generate(a.out, faults, a.seed, a.laps, a.radius * 1e-3, a.feed / 6e4)
+    generate(a.out, merged(a.fault), a.seed, a.laps, a.radius * 1e-3, a.feed / 6e4)
 
 
 if __name__ == "__main__":
