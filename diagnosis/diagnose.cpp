@@ -29,6 +29,8 @@ constexpr double kShareOfFound = 0.005;
 /// What a model gets wrong about the readings of a healthy machine changes by this share when the
 /// piece is clamped anew and friction is that of another day.
 constexpr double kChangeOfForm = 0.05;
+/// The same where no drive tells anything: nobody knows with what force an axis came to rest.
+constexpr double kChangeOfUnseen = 0.2;
 
 /// Effects that are told between two runs of one machine: more are a law that nobody has named.
 constexpr std::size_t kMostChanges = 5, kFewChanges = 3;
@@ -39,12 +41,19 @@ constexpr double kShareOfChange = 0.1;
 /// The same at a drive where one was found.
 constexpr double kShareBeside = 0.5;
 
+double change_of_form(const std::vector<ComparedChannel>& channels) {
+  const bool unseen = std::all_of(channels.begin(), channels.end(),
+                                  [](const ComparedChannel& c) { return is_reading(c.kind); });
+  return unseen ? kChangeOfUnseen : kChangeOfForm;
+}
+
 /// Chi-square of the held-out laps that this makes.
 std::vector<double> forms_of(const Evidence& evidence, const DifferentialRecord& difference) {
   const std::vector<ComparedChannel>& channels = evidence.replica().channels();
   std::vector<double> forms(channels.size(), 0.0);
   for (std::size_t c = 0; c < channels.size(); ++c) {
-    const double changed = kChangeOfForm * difference.off_in(channels[c]) / evidence.noise_left(c);
+    const double changed =
+        change_of_form(channels) * difference.off_in(channels[c]) / evidence.noise_left(c);
     forms[c] = evidence.count(c, Role::held_out) * changed * changed;
   }
   return forms;
@@ -99,7 +108,7 @@ DiagnosisOptions fitting(DiagnosisOptions options, const Evidence& evidence,
     double square = 0;
     for (const ComparedChannel& c : evidence.replica().channels())
       if (is_reading(c.kind)) square += std::pow(difference->off_in(c), 2);
-    options.form_um = 1e6 * kChangeOfForm * std::sqrt(square);
+    options.form_um = 1e6 * change_of_form(evidence.replica().channels()) * std::sqrt(square);
   } else if (!left.empty()) {
     allow_for_form(evidence, left, options);
   }

@@ -264,7 +264,7 @@ class Checker {
     std::string missing;
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)
       if (!known(axis)) missing += (missing.empty() ? "" : ", ") + std::string(kAxisNames[axis]);
-    warn("readings of the probe are there, but neither command nor position of " + missing +
+    warn("readings are there, but neither command nor position of " + missing +
          ": they are taken to stand where the machine of the model starts");
   }
 

@@ -19,6 +19,7 @@ constexpr double kSame = 1.03;              // of two factors
 constexpr double kDeflected = 10e-6;        // rms from which on a ball is deflected [m]
 constexpr double kTouched = 0.5e-6;         // ... from which on another unit would show [m]
 constexpr double kNoGain = 20;              // a factor that no fault makes
+constexpr double kNoFault = 1e-3;           // farther off than any fault brings a tool [m]
 
 double correlation(const std::vector<double>& x, const std::vector<double>& y) {
   double n = 0, sx = 0, sy = 0, xx = 0, yy = 0, xy = 0;
@@ -61,10 +62,10 @@ void check_unit(const Record& record, const std::vector<Reading>& readings) {
   const auto [least, most] = std::minmax_element(factors.begin(), factors.end());
   const std::string mistake = usual_mistake(*most);
   if (mistake.empty() || *most > kSame * *least) return;
-  throw MeasurementError(fmt::format(
-      "{}: all readings of the probe are {:.3g} times what the machine of the model would "
-      "read{}; check their unit, and the sizes of ball and piece",
-      record.source, *most, mistake));
+  throw MeasurementError(
+      fmt::format("{}: all readings are {:.3g} times what the machine of the model would "
+                  "read{}; check their unit, and the sizes of ball and piece",
+                  record.source, *most, mistake));
 }
 
 /// One reading in another unit than the others.
@@ -78,6 +79,32 @@ void check_unit_of_one(const Record& record, const Reading& reading) {
       record.source, name(*reading.measured), *factor, mistake));
 }
 
+/// Where the tool is, no fault changes by a millimetre.
+void check_zero(const Record& record, const Reading& r) {
+  std::vector<double> off;
+  for (std::size_t k = 0; k < r.predicted.size(); ++k)
+    if (const double by = r.measured->value[k] - r.predicted[k]; std::isfinite(by))
+      off.push_back(by);
+  if (off.empty()) return;
+  const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
+  std::nth_element(off.begin(), middle, off.end());
+  if (std::abs(*middle) < kNoFault) return;
+  throw MeasurementError(fmt::format(
+      "{}: {} is {:.3g} mm off what the machine of the model would read; check its unit and scale, "
+      "and zero_mm",
+      record.source, name(*r.measured), 1e3 * *middle));
+}
+
+/// Whether a reading goes as far as no fault does, so that it must go as it is predicted. The ball
+/// of an R-test is held: what is predicted of that are the errors of a healthy machine.
+bool goes_far(const Reading& r) {
+  if (r.measured->kind != SignalKind::tool_position) return true;
+  double low = HUGE_VAL, high = -HUGE_VAL;
+  for (const double x : r.predicted)
+    if (std::isfinite(x)) low = std::min(low, x), high = std::max(high, x);
+  return high - low > kNoFault;
+}
+
 }  // namespace
 
 void check_readings(const Record& record, const std::vector<ComparedChannel>& channels,
@@ -87,10 +114,13 @@ void check_readings(const Record& record, const std::vector<ComparedChannel>& ch
     const auto& [kind, axis] = channels[c];
     const MeasuredSignal* s = record.find(kind, axis);
     if (!s || (!is_reading(kind) && kind != SignalKind::twist)) continue;
+    const Reading reading{s, predicted[c]};
+    if (kind == SignalKind::tool_position) check_zero(record, reading);
+    if (!goes_far(reading)) continue;
     if (correlation(s->value, predicted[c]) < -kIs)
       throw MeasurementError(fmt::format(
           "{}: {} goes against what the machine does; check its sign", record.source, name(*s)));
-    if (is_reading(kind)) readings.push_back({s, predicted[c]});
+    if (is_reading(kind)) readings.push_back(reading);
   }
   const auto alike = [](const Reading& read, const Reading& as) {
     return correlation(read.measured->value, as.predicted);

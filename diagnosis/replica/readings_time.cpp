@@ -208,7 +208,7 @@ std::vector<std::string> check_reading_times(const Record& record, const Machine
                           *by > 0 ? "late" : "early");
   if (late.empty()) return {};
   const std::string told = fmt::format(
-      "{}: readings of the probe are not those of their time, by the {} of the axes: {}; put the "
+      "{}: readings are not those of their time, by the {} of the axes: {}; put the "
       "time stamps right (up to 5 ms late is told as sample_latency)",
       record.source, measured ? "positions" : "commands", late);
   if (measured) throw MeasurementError(told);

@@ -79,14 +79,14 @@ std::string figures_table(const std::vector<SignalFigure>& figures) {
   if (figures.empty()) return "";
   std::size_t width = 12;
   for (const SignalFigure& f : figures) width = std::max(width, f.run.size());
-  std::string text = fmt::format("{:<14}{:<{}}  {:>11}{:>11}{:>11}\n", "rms", "", width, "before",
+  std::string text = fmt::format("{:<16}{:<{}}  {:>11}{:>11}{:>11}\n", "rms", "", width, "before",
                                  "after", "noise");
   for (const SignalFigure& f : figures) {
     const ShownUnit unit = shown_unit(f.channel);
     const std::string floor =
         f.floor > 0 ? fmt::format("{:.4g}", f.floor * unit.factor) : std::string("-");
     text +=
-        fmt::format("{:<14}{:<{}}  {:>11.4g}{:>11.4g}{:>11} {}\n", channel_name(f.channel), f.run,
+        fmt::format("{:<16}{:<{}}  {:>11.4g}{:>11.4g}{:>11} {}\n", channel_name(f.channel), f.run,
                     width, f.before * unit.factor, f.after * unit.factor, floor, unit.name);
   }
   return text;

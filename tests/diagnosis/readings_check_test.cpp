@@ -62,6 +62,35 @@ TEST(ReadingsCheck, NamesColumnsThatAreAnotherReading) {
   EXPECT_NE(refusal({1, 2, 0}).find("swapped"), std::string::npos);
 }
 
+TEST(ReadingsCheck, NamesAToolPositionThatIsElsewhereAndNotOneOfAHeldBall) {
+  // What a healthy machine does to a ball that is held may well be turned by a fault.
+  EXPECT_EQ(refusal({0, 1, 2}, {1, 1, -1}, SignalKind::tool_position), "");
+  EXPECT_EQ(refusal({1, 0, 2}, {1, 1, 1}, SignalKind::tool_position), "");
+  const std::size_t n = 400;
+  std::vector<double> predicted(n), turned(n), shifted(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    predicted[k] = 0.05 * std::cos(2 * kPi * static_cast<double>(k) / n);
+    turned[k] = -predicted[k];
+    shifted[k] = predicted[k] + 5e-3;
+  }
+  const auto refusal_of = [&](const std::vector<double>& value) -> std::string {
+    Record record;
+    record.source = "grid.csv";
+    record.signals.push_back({SignalKind::tool_position, 0, "px", value, 0});
+    try {
+      check_readings(record, {{SignalKind::tool_position, 0}}, {predicted});
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal_of(predicted), "");
+  EXPECT_NE(refusal_of(turned).find("check its sign"), std::string::npos);
+  EXPECT_EQ(refusal_of(shifted),
+            "grid.csv: \"px\" (tool position x) is 5 mm off what the machine of the model would "
+            "read; check its unit and scale, and zero_mm");
+}
+
 TEST(ReadingsCheck, NamesAReadingThatGoesTheOtherWay) {
   EXPECT_EQ(refusal({0, 1, 2}, {1, 1, -1}),
             "run.csv: \"w\" (deflection z) goes against what the machine does; check its sign");
@@ -71,7 +100,7 @@ TEST(ReadingsCheck, NamesAReadingThatGoesTheOtherWay) {
 
 TEST(ReadingsCheck, NamesTheMistakeThatMakesAllReadingsTooLarge) {
   EXPECT_EQ(refusal({0, 1, 2}, {2, 2, 2}),
-            "run.csv: all readings of the probe are 2 times what the machine of the model would "
+            "run.csv: all readings are 2 times what the machine of the model would "
             "read (a factor of 2: diameter and radius, or periods and half periods); check their "
             "unit, and the sizes of ball and piece");
   EXPECT_NE(refusal({0, 1, 2}, {25.4, 25.4, 25.4}).find("inches and mm"), std::string::npos);
