@@ -543,6 +543,9 @@ def probe_leans_with_table(m, rng):
 
 
 def inject(m, name, place, parameters):
+    missing = set(EFFECTS[name].draw(np.random.default_rng(0), place)) - set(parameters)
+    if missing:
+        raise ValueError(f"{name} at {place} needs {', '.join(sorted(missing))}, too")
     EFFECTS[name].apply(m, AXES.index(place) if place in AXES else -1, parameters)
 
 
