@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "diagnosis/search/parallel.hpp"
 
@@ -42,7 +43,94 @@ struct Point {
   std::vector<Column> columns;
 };
 
-/// Minimum of s' A s - 2 b' s with no number further off its declaration than it is believed to be.
+/// s' A s - 2 b' s
+struct Quadratic {
+  const Eigen::MatrixXd& a;
+  const Eigen::VectorXd& b;
+
+  double at(const Eigen::VectorXd& s) const { return s.dot(a * s) - 2 * b.dot(s); }
+  /// Half of the gradient.
+  Eigen::VectorXd slope(const Eigen::VectorXd& s) const { return a * s - b; }
+};
+
+/// Lowest and highest step: no number further off its declaration than it is believed to be,
+/// infinite without a tolerance.
+struct StepBounds {
+  Eigen::VectorXd low, high;
+
+  StepBounds(const Eigen::VectorXd& precision, const Eigen::VectorXd& offset) {
+    const Eigen::VectorXd reach = kFarthestPull * precision.cwiseSqrt().cwiseInverse();
+    low = -reach - offset;
+    high = reach - offset;
+  }
+  Eigen::VectorXd clamped(const Eigen::VectorXd& s) const { return s.cwiseMax(low).cwiseMin(high); }
+  /// Numbers that are not at a bound beyond which they would go on downhill.
+  std::vector<Eigen::Index> free_at(const Eigen::VectorXd& s, const Eigen::VectorXd& slope) const {
+    std::vector<Eigen::Index> free;
+    for (Eigen::Index i = 0; i < s.size(); ++i)
+      if (!(s[i] <= low[i] && slope[i] > 0) && !(s[i] >= high[i] && slope[i] < 0))
+        free.push_back(i);
+    return free;
+  }
+};
+
+/// Numbers that would leave their bounds stay there, the others go on without them; those that
+/// would come back then do not.
+Eigen::VectorXd stopped_at_bounds(const Quadratic& q, const StepBounds& bounds) {
+  const Eigen::Index n = q.b.size();
+  Eigen::VectorXd s = Eigen::VectorXd::Zero(n);
+  std::vector<Eigen::Index> free(static_cast<std::size_t>(n));
+  std::iota(free.begin(), free.end(), Eigen::Index{0});
+  while (!free.empty()) {
+    const Eigen::VectorXd left = -q.slope(s);  // of those at their bounds; the others are 0 here
+    const Eigen::MatrixXd part = q.a(free, free);
+    const Eigen::VectorXd inner = part.ldlt().solve(Eigen::VectorXd(left(free)));
+    std::vector<Eigen::Index> inside;
+    Eigen::VectorXd whole = s;
+    whole(free) = inner;
+    for (const Eigen::Index i : free) {
+      if (whole[i] >= bounds.low[i] && whole[i] <= bounds.high[i])
+        inside.push_back(i);
+      else
+        s[i] = std::clamp(whole[i], bounds.low[i], bounds.high[i]);
+    }
+    if (inside.size() == free.size()) return whole;
+    free = std::move(inside);
+  }
+  return s;
+}
+
+/// Newton's steps of those that are free, projected on the bounds and shortened until they lead
+/// downhill (Bertsekas, SIAM J. Control Optim. 20 (1982) 221).
+Eigen::VectorXd descended(const Quadratic& q, const StepBounds& bounds, Eigen::VectorXd s) {
+  constexpr int kSteps = 60, kHalvings = 40;
+  constexpr double kEnough = 1e-4, kNothing = 1e-12, kRounding = 1e-8;
+  double cost = q.at(s);
+  for (int i = 0; i < kSteps; ++i) {
+    const Eigen::VectorXd slope = q.slope(s);
+    const std::vector<Eigen::Index> free = bounds.free_at(s, slope);
+    const Eigen::VectorXd rounding = kRounding * (q.b.cwiseAbs() + q.a.cwiseAbs() * s.cwiseAbs());
+    if (std::all_of(free.begin(), free.end(),
+                    [&](Eigen::Index k) { return std::abs(slope[k]) <= rounding[k]; }))
+      break;
+    Eigen::VectorXd way = Eigen::VectorXd::Zero(s.size());
+    const Eigen::MatrixXd part = q.a(free, free);
+    way(free) = -part.ldlt().solve(Eigen::VectorXd(slope(free)));
+    Eigen::VectorXd next = s;
+    double now = cost, share = 1;
+    for (int k = 0; k < kHalvings; ++k, share /= 2) {
+      next = bounds.clamped(s + share * way);
+      now = q.at(next);
+      if (now <= cost + kEnough * 2 * slope.dot(next - s)) break;
+    }
+    if (!(cost - now > kNothing * std::abs(cost))) break;
+    s = std::move(next);
+    cost = now;
+  }
+  return s;
+}
+
+/// Minimum of a quadratic within bounds.
 struct BoundedStep {
   Eigen::VectorXd step;
   std::vector<Eigen::Index> free;  ///< numbers that are not at their bound
@@ -50,31 +138,15 @@ struct BoundedStep {
 
 BoundedStep bounded_step(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
                          const Eigen::VectorXd& precision, const Eigen::VectorXd& offset) {
-  BoundedStep s{Eigen::VectorXd::Zero(b.size()), {}};
-  for (Eigen::Index i = 0; i < b.size(); ++i) s.free.push_back(i);
-  while (!s.free.empty()) {
-    const Eigen::VectorXd left = b - a * s.step;  // of those at their bounds; the others are 0 here
-    const Eigen::MatrixXd part = a(s.free, s.free);
-    const Eigen::VectorXd inner = part.ldlt().solve(Eigen::VectorXd(left(s.free)));
-    std::vector<Eigen::Index> inside;
-    Eigen::VectorXd step = s.step;
-    for (std::size_t k = 0; k < s.free.size(); ++k) {
-      const Eigen::Index i = s.free[k];
-      const double reach = kFarthestPull / std::sqrt(precision[i]);  // infinite without a tolerance
-      const double to = offset[i] + inner[static_cast<Eigen::Index>(k)];
-      if (std::abs(to) <= reach) {
-        inside.push_back(i);
-        continue;
-      }
-      s.step[i] = std::clamp(to, -reach, reach) - offset[i];
-    }
-    if (inside.size() == s.free.size()) {
-      s.step = std::move(step);
-      s.step(s.free) = inner;
-      break;
-    }
-    s.free = std::move(inside);
-  }
+  const Quadratic q{a, b};
+  const StepBounds bounds(precision, offset);
+  BoundedStep s{stopped_at_bounds(q, bounds), {}};
+  // Numbers whose columns nearly cancel each other stop at their bounds together, where the one
+  // makes sense with the other beyond its own only.
+  const Eigen::VectorXd none = bounds.clamped(Eigen::VectorXd::Zero(b.size()));
+  s.step = descended(q, bounds, q.at(s.step) <= q.at(none) ? s.step : none);
+  for (Eigen::Index i = 0; i < b.size(); ++i)
+    if (s.step[i] > bounds.low[i] && s.step[i] < bounds.high[i]) s.free.push_back(i);
   return s;
 }
 

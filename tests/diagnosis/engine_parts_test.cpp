@@ -269,6 +269,46 @@ TEST(LinearStep, TakesNoDeclaredNumberFurtherThanItIsBelievedToBe) {
   EXPECT_NEAR(linear_step(g, g, precision, offset).step[0], 2, 1e-6);
 }
 
+/// Within bounds the least of a quadratic is where no number would go on downhill that could.
+TEST(LinearStep, IsTheBestWithinAllToleranceTogether) {
+  std::uint64_t draw = 0;
+  const auto normal = [&] { return gaussian_noise(17, 3, draw++)[0]; };
+  int at_bounds = 0;
+  for (int round = 0; round < 2000; ++round) {
+    const Eigen::Index n = 2 + round % 7, samples = 3 * n;
+    Eigen::MatrixXd all(samples, n + 1);
+    for (Eigen::Index i = 0; i < all.size(); ++i) all.data()[i] = normal();
+    // Columns that nearly cancel, as those of a mass and of a friction do.
+    const double apart = std::pow(10, -(round % 5));
+    for (Eigen::Index j = 2; j <= n; j += 2)
+      all.col(j) = (j % 4 == 2 ? -1 : 1) * all.col(1) + apart * all.col(j);
+    all.col(0) *= 30;
+    Eigen::VectorXd precision(n), offset(n);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      precision[j] = j % 3 == 2 ? 0 : std::exp(normal());
+      offset[j] = precision[j] > 0 ? normal() / std::sqrt(precision[j]) : normal();
+    }
+    const Eigen::MatrixXd g = all.transpose() * all;
+    const LinearStep s = linear_step(g, g, precision, offset);
+    const Eigen::VectorXd at = offset + s.step;
+    const Eigen::VectorXd slope =
+        g.block(1, 1, n, n) * s.step - g.block(1, 0, n, 1) + precision.cwiseProduct(at);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const double reach = kFarthestPull / std::sqrt(precision[j]), slack = 1e-9 * (1 + reach);
+      const double flat = 1e-4 * (1 + std::abs(g(j + 1, 0)));
+      const double farthest = precision[j] > 0 ? reach + slack : HUGE_VAL;
+      ASSERT_LE(std::abs(at[j]), farthest) << round;
+      const bool low =
+          precision[j] > 0 && at[j]<-reach + slack, high = precision[j]> 0 && at[j] > reach - slack;
+      at_bounds += low || high;
+      EXPECT_LT(low ? -HUGE_VAL : slope[j], flat) << round << " " << j;
+      EXPECT_GT(high ? HUGE_VAL : slope[j], -flat) << round << " " << j;
+    }
+    EXPECT_LE(s.fitted, g(0, 0) + offset.dot(precision.cwiseProduct(offset)) + 1e-6);
+  }
+  EXPECT_GT(at_bounds, 1000);
+}
+
 TEST(NoiseAudit, CountsWhatEncodersRoundOffThoughItRepeats) {
   Record record = toy::commands(2048, 4);
   std::vector<double> noise(record.samples()), rounding(record.samples());
