@@ -8,6 +8,8 @@
 namespace vcnc {
 namespace {
 
+constexpr double kArithmetic = 1e-9;  ///< of a contour, that rounding of numbers makes [um]
+
 struct Difference {
   double sum = 0, n = 0;
 };
@@ -79,6 +81,7 @@ Consequence consequence(const Evidence& evidence, const Prediction& a, const Pre
     n = d.n;
   }
   if (n > 0) of.contour_um = std::sqrt(sum / n) * 1e6;
+  if (of.contour_um < kArithmetic) of.contour_um = 0;
   return of;
 }
 
