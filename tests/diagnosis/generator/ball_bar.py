@@ -84,6 +84,17 @@ def map_toml(begins, radius, feed, laps):
     return "\n".join(out)
 
 
+def healthy_and_faulty(faults, rng):
+    """The same individual twice, once with faults; what is on the table is set by itself."""
+    individual = machine.tolerated(rng)
+    machines = [machine.healthy(individual, rng), machine.healthy(individual, rng)]
+    for name, place, parameters in faults:
+        effects.inject(machines[1], name, place, parameters)
+    for m in machines:
+        m.geometry.piece, m.geometry.piece_turn = machine.PIECE, np.zeros(3)
+    return machines
+
+
 def generate(out, faults, seed=1, laps=1, radius=0.1, feed=0.05):
     """faults: (name, place, parameters) each."""
     out.mkdir(parents=True, exist_ok=True)
@@ -91,12 +102,7 @@ def generate(out, faults, seed=1, laps=1, radius=0.1, feed=0.05):
     (out / "machine.toml").write_text(toml)
     commands, begins = course(radius, feed, laps)
     rng = np.random.default_rng(seed)
-    individual = machine.tolerated(rng)
-    machines = [machine.healthy(individual, rng), machine.healthy(individual, rng)]
-    for name, place, parameters in faults:
-        effects.inject(machines[1], name, place, parameters)
-    for m in machines:  # the ball is set by itself
-        m.geometry.piece, m.geometry.piece_turn = machine.PIECE, np.zeros(3)
+    machines = healthy_and_faulty(faults, rng)
     runs = simulated(commands, machines, seed)
     inside = np.zeros(len(commands), bool)
     for begin in begins:

@@ -16,11 +16,10 @@ import pathlib
 import numpy as np
 
 import drives
-import effects
 import files
 import kinematics
 import machine
-from ball_bar import CLAMPED, fault, merged, simulated
+from ball_bar import CLAMPED, fault, healthy_and_faulty, merged, simulated
 
 BALL = np.array([0.03, 0.05, 0.06])  # in the frame of the table, from the piece's place
 TURN = 2 * np.pi
@@ -91,12 +90,7 @@ def generate(out, faults, seed=1):
     a, c, laps = rotary()
     commands = holding(a, c)
     rng = np.random.default_rng(seed)
-    individual = machine.tolerated(rng)
-    machines = [machine.healthy(individual, rng), machine.healthy(individual, rng)]
-    for name, place, parameters in faults:
-        effects.inject(machines[1], name, place, parameters)
-    for m in machines:  # the sensor is set by itself
-        m.geometry.piece, m.geometry.piece_turn = machine.PIECE, np.zeros(3)
+    machines = healthy_and_faulty(faults, rng)
     for name, m, series in zip(("healthy", "test"), machines, simulated(commands, machines, seed)):
         t, read = readings(m, series, commands, rng)
         factors = [1 / files.DEGREE if r else 1e3 for r in files.ROTARY]
