@@ -210,7 +210,7 @@ MeasuredTable table() {
                                  1e-4 * gaussian_noise(1, 0, t.line.size())[0]);
     t.columns[3].value.push_back(6e4 * std::sin(angle) +
                                  0.1 * gaussian_noise(1, 1, t.line.size())[0]);
-    t.line.push_back(k + 2);
+    t.line.push_back(t.line.size() + 2);
   }
   return t;
 }
