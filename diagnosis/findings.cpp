@@ -17,20 +17,16 @@
 #include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/screening.hpp"
 #include "diagnosis/search/trial.hpp"
+#include "diagnosis/verdict.hpp"
 #include "model/axes.hpp"
 #include "model/effects/list.hpp"
 
 namespace vcnc {
 namespace {
 
-constexpr double kQuiet = 1.05, kAllExplained = 0.98;
-/// What little an effect leaves is not explained by it where it is a tenth of what there was; what
-/// a drive that vibrates did is not compared.
-constexpr double kSilent = 1.005, kMostExplained = 0.9;
 /// Times the noise by which a signal is off for something that is there, and part of what it was
 /// off by before that a model of what was found may be wrong by.
 constexpr double kLoud = 1.5, kWrongOfFound = 0.05;
-constexpr double kFewSamples = 200;
 /// Part of the noise's chi-square that no law is sought in.
 constexpr double kFloorScatter = 0.04;
 /// Times the noise of a sample by which readings may shift from lap to lap.
@@ -271,9 +267,16 @@ class Report {
     }
   }
 
-  void tell_class(FoundEffect& e, const std::vector<std::size_t>& others) const {
+  void tell_class(FoundEffect& e, const std::vector<std::size_t>& others) {
     for (const std::size_t other : others) e.class_with.push_back(of_.candidates[other].name());
     if (others.empty()) return;
+    if (of_.record.on_table) {  // no program of ours moves about a ball on the table
+      d_.notes.push_back(
+          fmt::format("{} may be told apart from the others of its class by the same test with the "
+                      "ball at another place of the table.",
+                      name_of(e)));
+      return;
+    }
     e.separating_program = program_for(of_.candidates[others.front()].effect);
     if (e.separating_program.empty()) e.separating_program = program_for(e.name);
   }
@@ -446,8 +449,8 @@ class Report {
         d_.effects.push_back(std::move(e));
         continue;
       }
-      std::string text =
-          fmt::format("{}: the piece is not where it was in the reference run", name);
+      std::string text = fmt::format("{}: the {} is not where it was in the reference run", name,
+                                     of_.record.on_table ? "ball or the sensor" : "piece");
       for (const FittedNumber& n : e.numbers) {
         const double moved = n.value - number_of(of_.declared, n.key);
         if (n.high - n.low < std::abs(moved))
@@ -745,26 +748,21 @@ class Report {
     d_.chi2 = {before + floor_, after + floor_, floor_};
     d_.explained_share = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
     d_.left = ratio < kQuiet ? 0 : std::sqrt(ratio);
-    const bool excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),
-                                     [](const Excitation& e) { return e.excited; });
-    const bool few = selection_.found.found() <= options_.few_effects;
-    using enum DiagnosisVerdict;
-    if (selection_.interrupted)
-      d_.verdict = interrupted;
-    else if (evidence_.count(Role::held_out) < kFewSamples ||
-             (!excited && !named && !still_off_ && ratio < kQuiet))
-      d_.verdict = not_identifiable;
-    else if (d_.law || !d_.vibrations.empty())
-      d_.verdict = named ? partly : unexplained;
-    else if (named)
-      d_.verdict = !still_off_ && !made_worse_ &&
-                           (ratio < kSilent || d_.explained_share > kAllExplained ||
-                            (ratio < kQuiet && few &&
-                             (d_.explained_share > kMostExplained || !before_.chatter.empty())))
-                       ? explained
-                       : partly;
-    else
-      d_.verdict = !still_off_ && ratio < kQuiet ? no_deviation : unexplained;
+    d_.verdict = verdict_of({
+        .interrupted = selection_.interrupted,
+        .held_out_samples = evidence_.count(Role::held_out),
+        .excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),
+                               [](const Excitation& e) { return e.excited; }),
+        .named = named,
+        .law = d_.law.has_value(),
+        .vibrates = !d_.vibrations.empty(),
+        .still_off = still_off_,
+        .made_worse = made_worse_,
+        .few_effects = found().found() <= options_.few_effects,
+        .chatter_named = !before_.chatter.empty(),
+        .ratio = ratio,
+        .explained_share = d_.explained_share,
+    });
     if (!d_.differential && !selection_.interrupted && evidence_.noise().from_repetitions &&
         ratio > options_.model_form) {
       d_.model_form_share = before > 0 ? std::min(1.0, after / before) : 1;

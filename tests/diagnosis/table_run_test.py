@@ -38,7 +38,10 @@ class Run(unittest.TestCase):
         """The only effect, of geometry, its numbers within 5 % and their intervals."""
         self.assertEqual(report["verdict"], "EXPLAINED")
         self.assertEqual([(e["name"], e["axis"]) for e in report["effects"]], [(name, "geometry")])
-        told = {p["key"].rpartition(".")[2]: p for p in report["effects"][0]["parameters"]}
+        effect = report["effects"][0]
+        self.assertEqual(effect["separating_program"], "")  # none has a ball on the table
+        self.assertEqual(bool(effect["class"]), any("at another place of the table" in note for note in report["notes"]))
+        told = {p["key"].rpartition(".")[2]: p for p in effect["parameters"]}
         for key, value in truth.items():
             self.assertAlmostEqual(told[key]["value"], value, delta=0.05 * abs(value))
             self.assertLess(told[key]["low"], value)

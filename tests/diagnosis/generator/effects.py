@@ -543,6 +543,8 @@ def probe_leans_with_table(m, rng):
 
 
 def inject(m, name, place, parameters):
+    if name not in EFFECTS:
+        raise ValueError(f"there is no {name}, only {', '.join(sorted(EFFECTS))}")
     missing = set(EFFECTS[name].draw(np.random.default_rng(0), place)) - set(parameters)
     if missing:
         raise ValueError(f"{name} at {place} needs {', '.join(sorted(missing))}, too")
