@@ -24,7 +24,7 @@ namespace vcnc {
 
 int commission_command(const CommissionOptions& options) {
   keep_memory();
-  catch_stop_signals();
+  catch_stop_signals(kStopping);
   const Record record = load_record(options.run, options.map, options.model);
   const Machine declared = declared_machine(options.model, record);
   std::error_code error;

@@ -258,7 +258,7 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
 
 int diagnose_command(const DiagnoseOptions& options) {
   keep_memory();
-  catch_stop_signals();
+  catch_stop_signals(kStopping);
   const Record record = load_record(options.run, options.map, options.model);
   const Machine declared = declared_machine(options.model, record);
   if (!options.compare.empty()) {

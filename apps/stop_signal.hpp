@@ -5,8 +5,12 @@
 
 namespace vcnc {
 
-/// Installs the handlers for SIGINT and SIGTERM.
-void catch_stop_signals();
+/// Where what was found until then is told.
+inline constexpr const char* kStopping =
+    "\nstopping at the end of this step, with what was found; again: at once\n";
+/// Installs the handlers for SIGINT and SIGTERM; the second one ends the program. `says` is written
+/// to standard error at the first one; a literal.
+void catch_stop_signals(const char* says = "");
 
 /// Set by the first signal.
 const std::atomic<bool>& stop_requested();

@@ -260,14 +260,23 @@ void check_bar(const ImportMap& map, const std::string& name) {
   if (column == map.signals.end()) {
     if (map.bar.radius > 0) refuse("radius_mm", "no column is of kind bar");
     if (!map.arcs.empty())
-      Refusal(name, "arcs.", map.arcs.front().lines)("", "no column is of kind bar");
+      Refusal(name, "", map.arcs.front().lines)(
+          "arcs", "no column is of kind bar; of anything else the commands must be columns");
     return;
   }
   if (!(map.bar.radius > 0))
     refuse("radius_mm", "is missing; a column of kind bar needs the nominal length of the bar");
   if (!map.bar.lines.contains("centre_mm"))
     refuse("centre_mm", "is missing; a column of kind bar needs where the circle's centre is");
-  if (map.arcs.empty()) return;
+  if (map.arcs.empty()) {
+    const auto commands =
+        std::count_if(map.signals.begin(), map.signals.end(),
+                      [](const ImportMap::Signal& s) { return s.kind == ColumnKind::command; });
+    if (commands < 2)
+      Refusal(name, "signals.", column->lines)(
+          "kind", "a bar needs how the axes moved: columns with their commands, or [[arcs]]");
+    return;
+  }
   if (!(map.bar.feed > 0)) refuse("feed_mm_min", "is missing; arcs need their feed");
   for (const ImportMap::Signal& s : map.signals)
     if (!is_bar(s))
@@ -276,11 +285,14 @@ void check_bar(const ImportMap& map, const std::string& name) {
                               "the axes as columns instead of arcs",
                               to_string(s.kind)));
   if (!map.laps.empty())
-    Refusal(name, "laps.", map.laps.front().lines)("", "arcs say already which parts count");
+    Refusal(name, "", map.laps.front().lines)("laps", "arcs say already which parts count");
   double last = -HUGE_VAL;
   for (const ImportMap::Arc& arc : map.arcs) {
     const Refusal refuse_arc(name, "arcs.", arc.lines);
-    if (arc.from < last) refuse_arc("from_s", "the arc begins before the one above it ends");
+    if (arc.from < last)
+      refuse_arc("from_s", fmt::format("the arc begins before the one above it ends, by its sweep, "
+                                       "radius and feed at {:.3f} s",
+                                       last));
     if (std::abs(arc.sweep) < kLeastSweep)
       refuse_arc("sweep_deg", fmt::format("{:g} is too short an arc; at least {:g}",
                                           arc.sweep / kDegree, kLeastSweep / kDegree));

@@ -27,6 +27,8 @@ namespace {
 /// Times the noise by which a signal is off for something that is there, and part of what it was
 /// off by before that a model of what was found may be wrong by.
 constexpr double kLoud = 1.5, kWrongOfFound = 0.05;
+/// Of an amplitude, what is uncertain of it with its shape known, where the shape is all the rest.
+constexpr double kKnownTogether = 0.2;
 /// Part of the noise's chi-square that no law is sought in.
 constexpr double kFloorScatter = 0.04;
 /// Times the noise of a sample by which readings may shift from lap to lap.
@@ -204,6 +206,7 @@ class Report {
         if (n.whole) e.numbers.push_back({n.key, value, value, value});
       }
       e.gain = a.gain;
+      tell_known_together(a, intervals);
       if (may_be_as_declared(a, of_.declared, intervals)) {
         withhold(candidate, "fits, but may be as declared");
         continue;
@@ -254,6 +257,21 @@ class Report {
       d_.effects.push_back(std::move(e));
     }
     if (withheld_ || !put_back_.empty()) fit_what_is_told();
+  }
+
+  /// Amplitudes whose interval is wide only since a shape is not known: the height of a drift of
+  /// which no more than a straight piece was seen.
+  void tell_known_together(const AddedEffect& a, const std::map<std::string, Interval>& intervals) {
+    for (const FreedNumber& n : a.numbers) {
+      const auto i = intervals.find(n.number.key);
+      if (n.shape || i == intervals.end()) continue;
+      const double off = std::abs(n.value - number_of(of_.declared, n.number.key));
+      if (i->second.half_width < off || i->second.shapes_known > kKnownTogether * off) continue;
+      d_.notes.push_back(
+          fmt::format("{} is not known apart from the shape of its effect; with the shape that is "
+                      "told it is {:.4g} +- {:.2g}.",
+                      n.number.key, n.value, i->second.shapes_known));
+    }
   }
 
   /// A number that would go on if it might is of something else.

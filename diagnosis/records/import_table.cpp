@@ -23,6 +23,9 @@ namespace {
 
 constexpr std::size_t kShortestLap = 50;  // samples
 constexpr double kMostOfArc = 0.9;        // of its readings must be there
+constexpr double kBreak = 0.1;            // [s] without readings
+constexpr double kOfArc = 1e-3;           // by which readings and an arc may end elsewhere
+constexpr double kBarRange = 5e-3;        // [m]; of bars there are, 1 to 2 mm
 
 using Kind = ImportMap::Kind;
 
@@ -265,7 +268,8 @@ class Importer {
     std::vector<double> time;
     for (const std::size_t index : base_.index)
       time.push_back(base_.begin + static_cast<double>(index) * base_.period);
-    for (const ImportMap::Arc& a : map_.arcs) check_rows(a, time);
+    check_length(*columns_.front(), s);
+    check_arcs(*columns_.front(), time);
     const BarCourse course = bar_course(arcs, bar.feed / bar.radius, time, base_.period);
     if (course.later > base_.period)
       warn(
@@ -297,18 +301,97 @@ class Importer {
     record_.signals.push_back(std::move(length));
   }
 
-  /// An arc without readings is a mistake in its time.
-  void check_rows(const ImportMap::Arc& arc, const std::vector<double>& time) const {
-    const double to = arc.from + std::abs(arc.sweep) * map_.bar.radius / map_.bar.feed;
-    const auto from = std::lower_bound(time.begin(), time.end(), arc.from - 1e-9),
-               end = std::upper_bound(time.begin(), time.end(), to + 1e-9);
-    const double expected = (to - arc.from) / base_.period, there = static_cast<double>(end - from);
-    if (there < kMostOfArc * expected)
-      refuse(
-          arc.lines, "arcs.", "from_s",
-          fmt::format("from {:.3f} to {:.3f} s there are {:.0f} of {:.0f} readings; check times, "
-                      "angles, radius and feed",
-                      arc.from, to, there, expected));
+  /// A bar that reads more than its range is of another unit, or tells its whole length.
+  void check_length(const MeasuredColumn& c, const ImportMap::Signal& s) const {
+    double sum = 0, most = 0;
+    std::size_t there = 0, at = 0;
+    for (std::size_t i = 0; i < rows_; ++i) {
+      const double v = to_si(s, c.value[i]);
+      if (!std::isfinite(v)) continue;
+      sum += v, ++there;
+      if (std::abs(v) > most) most = std::abs(v), at = i;
+    }
+    if (there == 0)
+      throw MeasurementError(fmt::format("{}: \"{}\" has no value at all", table_.source, c.name));
+    if (most <= kBarRange) return;
+    const bool whole = std::abs(sum / static_cast<double>(there) - map_.bar.radius) < kBarRange;
+    throw MeasurementError(fmt::format(
+        "{}: \"{}\" (bar) is {:.4g} mm, and no ball bar moves by more than {:.0f} mm; {}",
+        table_.place(at), c.name, 1e3 * most, 1e3 * kBarRange,
+        whole ? "this is its whole length: take its radius off by offset"
+              : "check its unit and scale"));
+  }
+
+  /// Readings of an arc and around it, up to the next break.
+  struct Block {
+    double first = 0, last = 0;      ///< reading of the arc [s]
+    double begin = 0, end = 0;       ///< with those before and after it
+    double there = 0, expected = 0;  ///< readings within the arc
+  };
+
+  /// `time`: of every reading; `from` to `to`: the arc.
+  Block block_of(const std::vector<double>& time, double from, double to) const {
+    const double edge = 0.5 * base_.period, broken = kBreak + 2 * base_.period;
+    auto begin = std::lower_bound(time.begin(), time.end(), from - edge),
+         end = std::upper_bound(time.begin(), time.end(), to + edge);
+    Block b{.there = static_cast<double>(end - begin), .expected = (to - from) / base_.period + 1};
+    if (begin == end) return b;
+    b.first = *begin;
+    b.last = *(end - 1);
+    while (begin != time.begin() && *begin - *(begin - 1) < broken) --begin;
+    while (end != time.end() && *end - *(end - 1) < broken) ++end;
+    b.begin = *begin;
+    b.end = *(end - 1);
+    return b;
+  }
+
+  /// An arc is where its readings are: that one begins or ends elsewhere is a mistake in its time,
+  /// sweep, radius or feed, and shifts the angle of every reading.
+  void check_arcs(const MeasuredColumn& c, const std::vector<double>& time_of_row) {
+    std::vector<double> time;
+    for (std::size_t i = 0; i < rows_; ++i)
+      if (std::isfinite(c.value[i])) time.push_back(time_of_row[i]);
+    for (const ImportMap::Arc& arc : map_.arcs) {
+      const double to = arc.from + std::abs(arc.sweep) * map_.bar.radius / map_.bar.feed;
+      const double near = std::max(3 * base_.period, kOfArc * (to - arc.from));
+      const Block b = block_of(time, arc.from, to);
+      const auto no = [&](const std::string& reason) {
+        refuse(arc.lines, "arcs.", "from_s", reason);
+      };
+      if (b.there < kMostOfArc * b.expected)
+        no(
+            fmt::format("from {:.3f} to {:.3f} s there are {:.0f} of {:.0f} readings; check times, "
+                        "angles, radius and feed",
+                        arc.from, to, b.there, b.expected));
+      if (b.first > arc.from + near)
+        no(
+            fmt::format("the first reading of this arc is at {:.3f} s, later than {:.3f} s; give "
+                        "the time and the angle of that",
+                        b.first, arc.from));
+      if (b.last < to - near)
+        no(fmt::format(
+            "the last reading of this arc is at {:.3f} s, but by sweep, radius and feed "
+            "it ends at {:.3f} s",
+            b.last, to));
+      const bool begins = b.begin > arc.from - near, ends = b.end < to + near;
+      if (begins && !ends)
+        no(fmt::format(
+            "this arc begins with its readings and ends by sweep, radius and feed at "
+            "{:.3f} s, but they go on without a break to {:.3f} s; if these are of it a "
+            "feed of {:.6g} mm/min fits, else leave them out of the table",
+            to, b.end, map_.bar.feed * 6e4 * (to - arc.from) / (b.end - arc.from)));
+      if (ends && !begins)
+        no(
+            fmt::format("this arc ends with its readings and begins at {:.3f} s, but they come "
+                        "without a break from {:.3f} s on; check from_s and feed, or leave out of "
+                        "the table what is not of it",
+                        arc.from, b.begin));
+      if (b.there < b.expected - 1.5)
+        warn(
+            fmt::format("from {:.3f} to {:.3f} s {:.0f} of {:.0f} readings are missing and stay "
+                        "missing",
+                        arc.from, to, b.expected - b.there, b.expected));
+    }
   }
 
   void check_jumps(const MeasuredColumn& c, Kind kind) const {

@@ -10,6 +10,7 @@
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/records/record_check.hpp"
 #include "diagnosis/records/signal_name.hpp"
+#include "model/axes.hpp"
 
 namespace vcnc {
 namespace {
@@ -79,6 +80,15 @@ void check_unit_of_one(const Record& record, const Reading& reading) {
       record.source, name(*reading.measured), *factor, mistake));
 }
 
+/// Axes that are taken to stand at 0.
+std::string without_commands(const Record& record) {
+  std::string axes;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (!record.find(SignalKind::command, i))
+      axes += fmt::format("{}{}", axes.empty() ? "" : ", ", kAxisNames[i]);
+  return axes.empty() ? axes : fmt::format(" (no column is the command of {})", axes);
+}
+
 /// Where the tool is, no fault changes by a millimetre.
 void check_zero(const Record& record, const Reading& r) {
   std::vector<double> off;
@@ -91,8 +101,8 @@ void check_zero(const Record& record, const Reading& r) {
   if (std::abs(*middle) < kNoFault) return;
   throw MeasurementError(fmt::format(
       "{}: {} is {:.3g} mm off what the machine of the model would read; check its unit and scale, "
-      "and zero_mm",
-      record.source, name(*r.measured), 1e3 * *middle));
+      "zero_mm, and the commands of the axes: sign, unit, one for another{}",
+      record.source, name(*r.measured), 1e3 * *middle, without_commands(record)));
 }
 
 /// Whether a reading goes as far as no fault does, so that it must go as it is predicted. The ball

@@ -41,12 +41,56 @@ double size_of(const FittedMachine& machine, const FreedNumber& number) {
   return largest;
 }
 
-/// Sum over the clusters of the squares of what each moves the numbers by.
+/// Sum over the clusters of the squares of what each moves some of the numbers by.
 Eigen::VectorXd scatter(const Eigen::MatrixXd& inverse,
-                        const std::map<std::size_t, Eigen::VectorXd>& score_of) {
+                        const std::map<std::size_t, Eigen::VectorXd>& score_of,
+                        const std::vector<Eigen::Index>& some) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(inverse.rows());
-  for (const auto& [cluster, score] : score_of) sum += (inverse * score).cwiseAbs2();
+  for (const auto& [cluster, score] : score_of) sum += (inverse * score(some)).cwiseAbs2();
   return sum;
+}
+
+/// What chi-square tells of the numbers of a machine, in their typical sizes.
+struct Curvature {
+  Eigen::MatrixXd information;
+  /// Of the scores of parts of the record.
+  std::map<std::size_t, Eigen::VectorXd> of_block, of_condition, of_lap;
+  double ratio = 1;    ///< by which chi-square is too large
+  double of_laps = 0;  ///< factor of the scatter of laps that counts; 0: does not
+  bool inexact = false;
+};
+
+/// Half widths of some of the numbers, were all others known: of noise, and of the scatter between
+/// conditions where the model is not exact.
+struct HalfWidths {
+  Eigen::VectorXd noise, form;
+};
+
+HalfWidths half_widths(const Curvature& of, const std::vector<Eigen::Index>& some) {
+  const auto n = static_cast<Eigen::Index>(some.size());
+  const Eigen::MatrixXd information = of.information(some, some);
+  const Eigen::MatrixXd inverse =
+      information.ldlt().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
+  const auto clusters = static_cast<double>(of.of_block.size()),
+             conditions = static_cast<double>(of.of_condition.size()),
+             laps = static_cast<double>(of.of_lap.size());
+  const Eigen::VectorXd between_blocks = scatter(inverse, of.of_block, some) * clusters /
+                                         std::max(1.0, clusters - static_cast<double>(n)),
+                        between_conditions = scatter(inverse, of.of_condition, some) * conditions /
+                                             std::max(1.0, conditions - 1),
+                        between_laps =
+                            scatter(inverse, of.of_lap, some) * laps / std::max(1.0, laps - 1);
+  // With few clusters their scatter tells nothing.
+  const bool enough = clusters > 3 * static_cast<double>(n), several = conditions > 3;
+  const double few = several ? kFewConditions * student_95(conditions - 1) : 0;
+  HalfWidths widths{Eigen::VectorXd(n), Eigen::VectorXd::Zero(n)};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    widths.noise[i] = std::max(kNormal95 * std::sqrt(std::max({0.0, of.ratio * inverse(i, i),
+                                                               enough ? between_blocks[i] : 0.0})),
+                               of.of_laps * std::sqrt(between_laps[i]));
+    if (of.inexact) widths.form[i] = few * std::sqrt(between_conditions[i]);
+  }
+  return widths;
 }
 
 }  // namespace
@@ -70,14 +114,12 @@ std::map<std::string, Interval> intervals_of(const Evidence& evidence, const Fit
   const BlockGrams blocks = evidence.grams(columns);
   const Eigen::MatrixXd sum = evidence.sum(blocks, Role::fitted);
 
-  Eigen::MatrixXd information = sum.block(1, 1, n, n);
-  information.diagonal() += all.precision();
-  information.diagonal().array() += 1e-10 * (1e-6 + information.diagonal().array());
-  const Eigen::MatrixXd inverse =
-      information.ldlt().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
-  const double ratio = std::max(1.0, sum(0, 0) / std::max(1.0, evidence.count(Role::fitted)));
-
-  std::map<std::size_t, Eigen::VectorXd> of_block, of_condition, of_lap;
+  Curvature of;
+  of.information = sum.block(1, 1, n, n);
+  of.information.diagonal() += all.precision();
+  of.information.diagonal().array() += 1e-10 * (1e-6 + of.information.diagonal().array());
+  of.ratio = std::max(1.0, sum(0, 0) / std::max(1.0, evidence.count(Role::fitted)));
+  of.inexact = inexact;
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const RecordBlock& block = evidence.partition().blocks[b];
     const Eigen::VectorXd score = blocks[b].block(1, 0, n, 1);
@@ -86,36 +128,30 @@ std::map<std::string, Interval> intervals_of(const Evidence& evidence, const Fit
       if (!first) at->second += score;
     };
     if (block.held_out) continue;
-    add(of_lap, block.stretch);
-    add(of_block, b);
-    add(of_condition, static_cast<std::size_t>(block.condition));
+    add(of.of_lap, block.stretch);
+    add(of.of_block, b);
+    add(of.of_condition, static_cast<std::size_t>(block.condition));
   }
-  const auto clusters = static_cast<double>(of_block.size()),
-             conditions = static_cast<double>(of_condition.size()),
-             laps = static_cast<double>(of_lap.size());
-  const Eigen::VectorXd between_blocks =
-      scatter(inverse, of_block) * clusters / std::max(1.0, clusters - static_cast<double>(n));
-  const Eigen::VectorXd between_conditions =
-      scatter(inverse, of_condition) * conditions / std::max(1.0, conditions - 1);
-  const Eigen::VectorXd between_laps = scatter(inverse, of_lap) * laps / std::max(1.0, laps - 1);
-  // With few clusters their scatter tells nothing.
-  const bool enough = clusters > 3 * static_cast<double>(n), several = conditions > 3;
-  const double few = several ? kFewConditions * student_95(conditions - 1) : 0;
-  const double of_laps =
-      laps > kFewLaps && evidence.partition().repeated && !inexact ? kNormal95 : 0;
+  const bool many_laps = static_cast<double>(of.of_lap.size()) > kFewLaps;
+  of.of_laps = many_laps && evidence.partition().repeated && !inexact ? kNormal95 : 0;
+
+  std::vector<Eigen::Index> every, but_shapes;
   for (Eigen::Index i = 0; i < n; ++i) {
-    const FreedNumber& number = all.numbers[static_cast<std::size_t>(i)];
-    const double noise = std::max(
-        kNormal95 *
-            std::sqrt(std::max({0.0, ratio * inverse(i, i), enough ? between_blocks[i] : 0.0})),
-        of_laps * std::sqrt(between_laps[i]));
-    const double form =
-        inexact
-            ? std::hypot(few * std::sqrt(between_conditions[i]),
-                         kNormal95 * kKnownTo * size_of(machine, number) / number.number.typical)
-            : 0;
-    intervals[number.number.key] = {std::hypot(noise, form) * number.number.typical};
+    every.push_back(i);
+    if (!all.numbers[static_cast<std::size_t>(i)].shape) but_shapes.push_back(i);
   }
+  const auto fill = [&](const std::vector<Eigen::Index>& some, double Interval::*width) {
+    const HalfWidths widths = half_widths(of, some);
+    for (std::size_t j = 0; j < some.size(); ++j) {
+      const FreedNumber& number = all.numbers[static_cast<std::size_t>(some[j])];
+      const double unit = number.number.typical, known = size_of(machine, number) / unit;
+      const auto at = static_cast<Eigen::Index>(j);
+      const double form = inexact ? std::hypot(widths.form[at], kNormal95 * kKnownTo * known) : 0;
+      intervals[number.number.key].*width = std::hypot(widths.noise[at], form) * unit;
+    }
+  };
+  fill(every, &Interval::half_width);
+  fill(but_shapes, &Interval::shapes_known);
   return intervals;
 }
 
@@ -126,7 +162,7 @@ bool may_be_as_declared(const AddedEffect& effect, const Machine& declared,
     if (n.shape || is_phase(n.number)) continue;
     some = true;
     const auto i = intervals.find(n.number.key);
-    const double half = i == intervals.end() ? 0 : i->second.half_width;
+    const double half = i == intervals.end() ? 0 : i->second.shapes_known;
     if (std::abs(n.value - number_of(declared, n.number.key)) > half) return false;
   }
   return some;

@@ -20,6 +20,9 @@ namespace vcnc {
 
 struct Interval {
   double half_width = 0;  ///< of the 95 % interval, in the unit of the key
+  /// The same were the shapes of effects known: the height of a slow drift and its time constant
+  /// may be known together alone.
+  double shapes_known = 0;
 };
 
 /// Whether a model is known to be more than noise off the machine, where it leaves `held_out` of a
@@ -31,8 +34,8 @@ bool is_inexact(const Evidence& evidence, const DiagnosisOptions& options, doubl
 std::map<std::string, Interval> intervals_of(const Evidence& evidence, const FittedMachine& machine,
                                              bool inexact = false);
 
-/// Whether the intervals of all amplitudes of an effect hold what is declared: it is not known to
-/// be there at all. Not of one that has none but a limit.
+/// Whether the intervals of all amplitudes of an effect, its shape known, hold what is declared: it
+/// is not known to be there at all. Not of one that has none but a limit.
 bool may_be_as_declared(const AddedEffect& effect, const Machine& declared,
                         const std::map<std::string, Interval>& intervals);
 

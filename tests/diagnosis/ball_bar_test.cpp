@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -179,13 +180,18 @@ TEST(BallBar, IsInTheFileOfARecord) {
             written.find(SignalKind::command, kX)->value);
 }
 
-std::string refusal(const std::string& map, int laps = 1) {
+std::string refusal(const MeasuredTable& t, const std::string& map) {
   try {
-    import_table(table(laps), parse_import_map(map, "map.toml"), "map.toml", nullptr);
+    import_table(t, parse_import_map(map, "map.toml"), "map.toml", nullptr);
   } catch (const InputError& e) {
     return e.what();
   }
   return "";
+}
+std::string refusal(const std::string& map) { return refusal(table(1), map); }
+
+std::string with(std::string map, const std::string& line, const std::string& instead) {
+  return map.replace(map.find(line), line.size(), instead);
 }
 
 TEST(BallBar, RefusesWithKeyAndReason) {
@@ -197,6 +203,9 @@ TEST(BallBar, RefusesWithKeyAndReason) {
       {without("radius_mm = 100"), "bar.radius_mm: is missing"},
       {without("centre_mm = [20, -10, 100]"), "bar.centre_mm: is missing"},
       {without("feed_mm_min = 6000") + arc(0, 0, 360), "bar.feed_mm_min: is missing; arcs need"},
+      {kSound, "signals.kind: a bar needs how the axes moved"},
+      {kSound + arc(0, 0, 360) + "[[laps]]\nfrom_s = 0\nto_s = 2\n",
+       "map.toml:19: laps: arcs say already"},
       {std::string(kSound) + arc(0, 0, 5), "arcs.sweep_deg: 5 is too short an arc"},
       {std::string(kSound) + arc(0, 0, 360) + arc(2, 0, 360),
        "arcs.from_s: the arc begins before the one above it ends"},
@@ -222,6 +231,49 @@ radius_mm = 100
        "bar.radius_mm: no column is of kind bar"}};
   for (const auto& [map, reason] : cases)
     EXPECT_NE(refusal(map).find(reason), std::string::npos) << reason << "\n" << refusal(map);
+}
+
+TEST(BallBar, AnArcIsWhereItsReadingsAre) {
+  const std::string both = arc(0, 0, 360) + arc(kLap + kPause, 360, -360), map = kSound + both,
+                    feed = "feed_mm_min = 6000";
+  EXPECT_EQ(refusal(map), "");
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {with(map, feed, "feed_mm_min = 6050"),
+       "ends by sweep, radius and feed at 6.231 s, but they go on without a break to 6.283 s; if "
+       "these are of it a feed of 6000.18 mm/min fits"},
+      {with(map, feed, "feed_mm_min = 5950"), "the last reading of this arc is at 6.283 s"},
+      {kSound + arc(0, 0, 350), "go on without a break to 6.283 s"},
+      {kSound + arc(kLap, 0, -360), "there are 1 of"},
+      {kSound + arc(kLap + kPause - 0.3, 360, -360), "the first reading of this arc is at 16.283"},
+      {kSound + arc(0.3, 0, 342.8), "come without a break from 0.000 s on"}};
+  for (const auto& [wrong, reason] : cases)
+    EXPECT_NE(refusal(wrong).find(reason), std::string::npos) << reason << "\n" << refusal(wrong);
+  // A bar that is read all the time: what is before and after an arc is none of it.
+  EXPECT_EQ(refusal(kSound + arc(0.5, 30, 300)), "");
+}
+
+TEST(BallBar, MissingReadingsOfAnArcAreTold) {
+  MeasuredTable t = table(1);
+  for (std::size_t i = 2000; i < 2100; ++i) t.columns[1].value[i] = std::nan("");
+  const std::string map = kSound + arc(0, 0, 360) + arc(kLap + kPause, 360, -360);
+  const Record told = import_table(t, parse_import_map(map, "map.toml"), "map.toml", nullptr);
+  EXPECT_TRUE(
+      std::any_of(told.warnings.begin(), told.warnings.end(), [](const std::string& warning) {
+        return warning.find("100 of 6284 readings are missing") != std::string::npos;
+      }));
+  for (double& v : t.columns[1].value) v = std::nan("");
+  EXPECT_NE(refusal(t, map).find("\"r\" has no value at all"), std::string::npos);
+}
+
+TEST(BallBar, ReadsNoMoreThanABarMovesBy) {
+  const std::string map = kSound + arc(0, 0, 360) + arc(kLap + kPause, 360, -360);
+  MeasuredTable t = table(1);
+  for (double& v : t.columns[1].value) v += 12;
+  EXPECT_NE(refusal(t, with(map, "\"um\"", "\"mm\"")).find("check its unit and scale"),
+            std::string::npos);
+  for (double& v : t.columns[1].value) v = 100 + 1e-3 * v;
+  EXPECT_NE(refusal(t, with(map, "\"um\"", "\"mm\"")).find("this is its whole length"),
+            std::string::npos);
 }
 
 /// Two laps each way of a machine that is as declared but for two faults.

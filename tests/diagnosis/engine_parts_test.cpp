@@ -407,7 +407,7 @@ TEST(Intervals, OfAllAmplitudesMustHoldWhatIsDeclaredForAnEffectToBeUncertain) {
       period{{"effects.X.pitch_periodic.period_mm", 10, 0.001, 1e4}, 12.0, 0, 0, true};
   const AddedEffect wave{.candidate = 0, .numbers = {height, period}};
   const auto uncertain = [&](const AddedEffect& effect, double half_width) {
-    return may_be_as_declared(effect, Machine(), {{height.number.key, {half_width}}});
+    return may_be_as_declared(effect, Machine(), {{height.number.key, {100, half_width}}});
   };
   EXPECT_TRUE(uncertain(wave, 3.1));
   EXPECT_FALSE(uncertain(wave, 2.9));  // however uncertain the period is
@@ -799,6 +799,30 @@ TEST(Intervals, WhatALawGetsWrongAboutOneAmplitudeShowsInTheOthers) {
   m.columns = columns_of(evidence, m.machine, m.prediction, m.numbers());
   const auto intervals = intervals_of(evidence, m, true);
   EXPECT_GT(intervals.at(small.number.key).half_width, 1.9 * 0.02 * 50);
+}
+
+TEST(Intervals, AShapeThatDoesTheSameLeavesAnAmplitudeKnownWithIt) {
+  Record record = toy::commands(400, 4);
+  toy::measure(record, Machine(), 3);
+  toy::ToyReplica replica(record);
+  Evidence evidence(record, replica, Machine());
+  FittedMachine m = fit_declared(evidence, Machine());
+  const FreedNumber height{.number = {"effects.geometry.squareness.xy_urad", 50, -5000, 5000},
+                           .value = 50};
+  FreedNumber slowness = height;
+  slowness.number.key = "effects.geometry.squareness.xz_urad";
+  slowness.shape = true;
+  const AddedEffect drift{.candidate = 5, .numbers = {height, slowness}};
+  m.added.push_back(drift);
+  const Column column = columns_of(evidence, m.machine, m.prediction, {height}).front();
+  m.columns = {column, column};
+  const auto intervals = intervals_of(evidence, m);
+  const Interval of = intervals.at(height.number.key);
+  EXPECT_GT(of.half_width, 50);
+  EXPECT_LT(of.shapes_known, 1);
+  EXPECT_FALSE(may_be_as_declared(drift, Machine(), intervals));
+  m.columns = {column, evidence.sensitivity(m.prediction, m.prediction, 1)};  // it does nothing
+  EXPECT_NEAR(intervals_of(evidence, m).at(height.number.key).half_width, of.shapes_known, 1e-6);
 }
 
 /// Right where it was anchored; elsewhere only seven tenths of a change are seen.
