@@ -283,12 +283,12 @@ int diagnose_command(const DiagnoseOptions& options) {
     append_told(other_machine(record, predicted), of_tests);
     append_all(check_reading_times(predicted, declared, piece_of(declared, predicted)), of_tests);
   }
-  const std::string page = "report.html";
-  std::filesystem::path folder;
-  if (!options.out.empty()) folder = page_folder(options.out, page, kDiagnosisMark);
   const auto replica = bare ? nullptr : replica_of(record, declared);
   std::vector<std::string> of_times;
   if (!bare) of_times = check_reading_times(record, declared, piece_of(declared, record));
+  const std::string page = "report.html";
+  std::filesystem::path folder;
+  if (!options.out.empty()) folder = page_folder(options.out, page, kDiagnosisMark);
   Record seen = record;
   Diagnosis d = bare ? diagnose_quadrature(record, declared)
                      : diagnose_machine(options, record, *replica, declared, seen);
