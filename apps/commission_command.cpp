@@ -13,11 +13,8 @@
 #include "apps/stop_signal.hpp"
 #include "configs/config.hpp"
 #include "diagnosis/commission.hpp"
-#include "diagnosis/diagnose.hpp"
 #include "diagnosis/records/any_record.hpp"
-#include "diagnosis/replica/machine_replica.hpp"
-#include "diagnosis/replica/readings_check.hpp"
-#include "diagnosis/replica/readings_time.hpp"
+#include "diagnosis/replica/checked_replica.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
 
 namespace vcnc {
@@ -31,19 +28,15 @@ int commission_command(const CommissionOptions& options) {
   if (!options.model.empty() && std::filesystem::equivalent(options.model, options.out, error))
     throw InputError("--out " + options.out + ": is the declared machine itself");
   check_machine_output(options.out);
-  MachineReplica replica(record, declared, piece_of(declared, record));
-  check_readings(record, replica.channels(), replica.predict(declared));
-  const std::vector<std::string> of_times =
-      check_reading_times(record, declared, piece_of(declared, record));
-  if (replica.channels().empty())
-    throw InputError(record.source + ": holds nothing that can be predicted");
+  std::vector<std::string> of_times;
+  const auto replica = checked_replica(record, declared, of_times);
   ProgressLine progress;
   const auto keep_going = [&](const DiagnosisProgress& p) {
     progress.show(fmt::format("{} {:.0f} %", p.doing, p.share * 100));
     return !stop_requested();
   };
   const Commissioning c =
-      commission({record, replica, declared, candidates(declared)}, {}, keep_going);
+      commission({record, *replica, declared, candidates(declared)}, {}, keep_going);
   progress.clear();
   if (c.numbers.empty() && !stop_requested())
     throw InputError(record.source +

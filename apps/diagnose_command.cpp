@@ -20,9 +20,8 @@
 #include "diagnosis/quadrature.hpp"
 #include "diagnosis/records/any_record.hpp"
 #include "diagnosis/records/series.hpp"
+#include "diagnosis/replica/checked_replica.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
-#include "diagnosis/replica/readings_check.hpp"
-#include "diagnosis/replica/readings_time.hpp"
 #include "diagnosis/report/diagnosis_json.hpp"
 #include "diagnosis/report/diagnosis_page.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
@@ -34,22 +33,6 @@ namespace vcnc {
 
 namespace {
 
-std::unique_ptr<MachineReplica> replica_of(const Record& record, const Machine& declared) {
-  std::unique_ptr<MachineReplica> replica;
-  try {
-    replica = std::make_unique<MachineReplica>(record, declared, piece_of(declared, record));
-  } catch (const std::invalid_argument& e) {
-    throw InputError(record.source + ": " + e.what());
-  }
-  if (replica->channels().empty())
-    throw InputError(record.source +
-                     ": holds nothing that can be predicted: a position needs the command of its "
-                     "axis, a twist or force its command or position, a deflection those of all "
-                     "axes");
-  check_readings(record, replica->channels(), replica->predict(declared));
-  return replica;
-}
-
 /// What both machines are off a record, less what a healthy run of its program has besides where
 /// there is one (else null).
 void append_figures(std::vector<SignalFigure>& figures, const Record& record,
@@ -58,10 +41,10 @@ void append_figures(std::vector<SignalFigure>& figures, const Record& record,
   DifferentialRecord less;
   if (healthy) less = less_healthy(record, *healthy);
   const Record& of = healthy ? less.record : record;
-  const auto replica = replica_of(of, declared);
-  if (healthy) replica->apply(less.unknown);
+  MachineReplica replica(of, declared, piece_of(declared, of));
+  if (healthy) replica.apply(less.unknown);
   const std::vector<SignalFigure> more =
-      figures_of(of, *replica, declared, found, name, less.noise_scales(replica->channels()));
+      figures_of(of, replica, declared, found, name, less.noise_scales(replica.channels()));
   figures.insert(figures.end(), more.begin(), more.end());
 }
 
@@ -125,10 +108,6 @@ void append_told(std::string sentence, std::vector<std::string>& warnings) {
   if (!sentence.empty()) warnings.push_back(std::move(sentence));
 }
 
-void append_all(const std::vector<std::string>& sentences, std::vector<std::string>& warnings) {
-  warnings.insert(warnings.end(), sentences.begin(), sentences.end());
-}
-
 bool same_values(const Record& a, const Record& b) {
   return std::equal(
       a.signals.begin(), a.signals.end(), b.signals.begin(), b.signals.end(),
@@ -139,21 +118,57 @@ bool same_values(const Record& a, const Record& b) {
       });
 }
 
-/// Nothing without --reference.
-std::optional<HealthyRun> reference_run(const DiagnoseOptions& options, const Machine& declared) {
+struct CheckedRun {
+  Record record;
+  std::unique_ptr<MachineReplica> replica;
+};
+
+CheckedRun checked_run(const DiagnoseOptions& options, const std::string& path,
+                       const Machine& declared, std::vector<std::string>& warnings) {
+  CheckedRun run{load_record(path, options.map, options.model), nullptr};
+  run.replica = checked_replica(run.record, declared, warnings);
+  return run;
+}
+
+/// The healthy run, where --reference names one.
+std::optional<CheckedRun> checked_reference(const DiagnoseOptions& options, const Record& record,
+                                            const Machine& declared,
+                                            std::vector<std::string>& warnings) {
   if (options.reference.empty()) return std::nullopt;
-  const Record record = load_record(options.reference, options.map, options.model);
-  check_reading_times(record, declared, piece_of(declared, record));
-  return healthy_run_with_forces(record, *replica_of(record, declared), declared);
+  CheckedRun run = checked_run(options, options.reference, declared, warnings);
+  check_comparable(record, run.record);
+  append_told(other_machine(record, run.record), warnings);
+  return run;
+}
+
+/// `reference` may be null.
+void check_tests(const DiagnoseOptions& options, const Record& record, const Machine& declared,
+                 const CheckedRun* reference, std::vector<std::string>& warnings) {
+  for (const std::string& test : options.tests) {
+    const CheckedRun run = checked_run(options, test, declared, warnings);
+    check_same_kinematics(record, run.record);
+    if (reference && same_program(run.record, reference->record))
+      check_comparable(run.record, reference->record);
+    append_told(other_machine(record, run.record), warnings);
+  }
+}
+
+/// Nothing without a reference.
+std::optional<HealthyRun> healthy_run_of(std::optional<CheckedRun> reference,
+                                         const Machine& declared) {
+  if (!reference) return std::nullopt;
+  return healthy_run_with_forces(reference->record, *reference->replica, declared);
 }
 
 int compare_models(const DiagnoseOptions& options, const Record& record, const Machine& declared) {
   const Machine found = load_machine(options.compare);
-  for (const std::string& warning :
-       check_reading_times(record, declared, piece_of(declared, record)))
-    std::cerr << "vcnc: " << warning << '\n';
+  std::vector<std::string> warnings;
+  checked_replica(record, declared, warnings);
+  std::optional<CheckedRun> reference = checked_reference(options, record, declared, warnings);
+  check_tests(options, record, declared, reference ? &*reference : nullptr, warnings);
+  for (const std::string& warning : warnings) std::cerr << "vcnc: " << warning << '\n';
   std::vector<SignalFigure> figures;
-  const std::optional<HealthyRun> healthy = reference_run(options, declared);
+  const std::optional<HealthyRun> healthy = healthy_run_of(std::move(reference), declared);
   const Machine& before = healthy ? healthy->machine : declared;
   append_figures(figures, record, healthy ? &*healthy : nullptr, before, found, "run");
   predict_tests(options, healthy, before, found, figures);
@@ -216,15 +231,17 @@ std::vector<Candidate> candidates_of(const DiagnoseOptions& options, const Recor
 /// `seen` becomes what the diagnosis was made on: in differential mode the record less the healthy
 /// run.
 Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
-                           MachineReplica& replica, const Machine& declared, Record& seen) {
+                           MachineReplica& replica, std::optional<CheckedRun> reference,
+                           const Machine& declared, std::vector<Candidate> candidates,
+                           Record& seen) {
   ProgressLine progress;
   const auto keep_going = [&](const DiagnosisProgress& p) {
     progress.show(fmt::format("{} {:.0f} %", p.doing, p.share * 100));
     return !stop_requested();
   };
-  const DiagnosisCase of{record, replica, declared, candidates_of(options, record, declared)};
-  if (!options.reference.empty()) progress.show("fitting the reference run");
-  const std::optional<HealthyRun> healthy = reference_run(options, declared);
+  const DiagnosisCase of{record, replica, declared, std::move(candidates)};
+  if (reference) progress.show("fitting the reference run");
+  const std::optional<HealthyRun> healthy = healthy_run_of(std::move(reference), declared);
   DiagnosisOptions asked;
   asked.suspects = options.suspects;
   Diagnosis d;
@@ -242,15 +259,14 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
   if (healthy && same_values(record, healthy->record))
     d.warnings.push_back(
         "The reference run holds the same values as the run itself: no difference can be found.");
-  if (healthy) append_told(other_machine(record, healthy->record), d.warnings);
   const bool interrupted = stop_requested();  // the diagnosis says so itself
   predict_tests(options, healthy, d.declared, d.found, d.figures);
   if (stop_requested() && !interrupted)
     d.warnings.push_back("Interrupted: not all test runs are predicted.");
   if (options.model.empty() && !d.effects.empty() && d.verdict != DiagnosisVerdict::explained)
     d.notes.push_back(
-        "Declared is the machine that the run names, without any effect; --model MACHINE.toml says "
-        "which ones are believed present.");
+        "Declared is the machine that the run names; --model MACHINE.toml says otherwise which "
+        "effects are believed present.");
   return d;
 }
 
@@ -275,25 +291,20 @@ int diagnose_command(const DiagnoseOptions& options) {
         "--reference, --test, --suspect, --without: are for machines, not for the signals of an "
         "encoder");
   // What cannot be predicted is refused before anything is sought.
-  std::vector<std::string> of_tests;
-  for (const std::string& test : options.tests) {
-    const Record predicted = load_record(test, options.map, options.model);
-    check_same_kinematics(record, predicted);
-    replica_of(predicted, declared);
-    append_told(other_machine(record, predicted), of_tests);
-    append_all(check_reading_times(predicted, declared, piece_of(declared, predicted)), of_tests);
-  }
-  const auto replica = bare ? nullptr : replica_of(record, declared);
-  std::vector<std::string> of_times;
-  if (!bare) of_times = check_reading_times(record, declared, piece_of(declared, record));
+  std::vector<std::string> of_runs;
+  const auto replica = bare ? nullptr : checked_replica(record, declared, of_runs);
+  std::optional<CheckedRun> reference = checked_reference(options, record, declared, of_runs);
+  check_tests(options, record, declared, reference ? &*reference : nullptr, of_runs);
+  std::vector<Candidate> candidates;
+  if (!bare) candidates = candidates_of(options, record, declared);
   const std::string page = "report.html";
   std::filesystem::path folder;
   if (!options.out.empty()) folder = page_folder(options.out, page, kDiagnosisMark);
   Record seen = record;
   Diagnosis d = bare ? diagnose_quadrature(record, declared)
-                     : diagnose_machine(options, record, *replica, declared, seen);
-  append_all(of_times, d.warnings);
-  append_all(of_tests, d.warnings);
+                     : diagnose_machine(options, record, *replica, std::move(reference), declared,
+                                        std::move(candidates), seen);
+  d.warnings.insert(d.warnings.end(), of_runs.begin(), of_runs.end());
   std::cout << to_text(d);
   const int code = stop_requested() ? kExitInterrupted : kExitOk;
   if (folder.empty()) return code;

@@ -5,8 +5,10 @@
 
 #include "configs/import_map.hpp"
 #include "diagnosis/quadrature.hpp"
+#include "diagnosis/records/any_record.hpp"
 #include "diagnosis/records/import_table.hpp"
 #include "diagnosis/records/record_file.hpp"
+#include "diagnosis/replica/checked_replica.hpp"
 
 namespace vcnc {
 
@@ -33,12 +35,15 @@ void import_command(const ImportOptions& options) {
     if (value->empty()) throw InputError(std::string(name) + ": is missing");
   refuse_foreign(options.out);
   const Record record = import_files(options.table, options.map);
+  std::vector<std::string> warnings = record.warnings;
+  if (!record.machine_toml.empty() && !is_bare_encoder(record))
+    checked_replica(record, declared_machine("", record), warnings);
   write_record(record, options.out);
   std::cout << describe(record);
-  for (const std::string& warning : record.warnings) std::cerr << "vcnc: " << warning << '\n';
+  for (const std::string& warning : warnings) std::cerr << "vcnc: " << warning << '\n';
   if (record.machine_toml.empty() && !is_bare_encoder(record))
-    std::cout << "The map names no machine: travels, speeds, forces and inertias are not checked "
-                 "until vcnc diagnose has the model.\n";
+    std::cout << "The map names no machine: travels, speeds, forces, inertias and readings are not "
+                 "checked until vcnc diagnose has the model.\n";
   std::cout << "record: " << fs::absolute(options.out).string() << '\n';
 }
 

@@ -286,6 +286,8 @@ void check_bar(const ImportMap& map, const std::string& name) {
                               to_string(s.kind)));
   if (!map.laps.empty())
     Refusal(name, "", map.laps.front().lines)("laps", "arcs say already which parts count");
+  if (!map.lap_column.empty())
+    Refusal(name, "", map.lines)("lap_column", "arcs say already which parts count");
   double last = -HUGE_VAL;
   for (const ImportMap::Arc& arc : map.arcs) {
     const Refusal refuse_arc(name, "arcs.", arc.lines);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "diagnosis/replica/model_comparison.hpp"
+#include "diagnosis/report/diagnosis_text.hpp"
 #include "diagnosis/search/common_numbers.hpp"
 #include "diagnosis/search/consequence.hpp"
 #include "diagnosis/search/freed_number.hpp"
@@ -151,7 +152,7 @@ class Report {
           "the contour and {:.0f} % of the noise of a sample to any signal.",
           name_of(e), e.numbers.front().key, e.numbers.front().value, e.contour_error_um,
           100 * share));
-    for (const FittedNumber& n : e.numbers) move_number(d_.found, n.key, number_of(without, n.key));
+    for (const FittedNumber& n : e.numbers) put_back(n.key, number_of(without, n.key));
     return true;
   }
 
@@ -184,7 +185,7 @@ class Report {
         continue;
       }
       d_.notes.push_back(u.key + " is declared as uncertain, and this run does not show it.");
-      move_number(d_.found, u.key, number_of(of_.declared, u.key));
+      put_back(u.key, number_of(of_.declared, u.key));
     }
   }
 
@@ -244,8 +245,8 @@ class Report {
       move_number(without, key, n.centre);
       if (e.numbers.front().low <= n.centre && n.centre <= e.numbers.front().high) {
         d_.notes.push_back(fmt::format("{} may be out of tolerance, or as declared.", key));
-        move_number(d_.found, key, number_of(selection_.base.machine, key));
-        put_back_.push_back(n);
+        put_back(key, number_of(selection_.base.machine, key));
+        held_.push_back(n);
         continue;
       }
       const Prediction less = evidence_.predict(without);
@@ -256,7 +257,7 @@ class Report {
       tell_class(e, released->class_with);
       d_.effects.push_back(std::move(e));
     }
-    if (withheld_ || !put_back_.empty()) fit_what_is_told();
+    if (withheld_ || !held_.empty()) fit_what_is_told();
   }
 
   /// Amplitudes whose interval is wide only since a shape is not known: the height of a drift of
@@ -304,12 +305,18 @@ class Report {
     withheld_ = true;
     d_.notes.push_back(fmt::format("{} {}.", candidate.name(), why));
     for (const FreeNumber& n : candidate.numbers)
-      move_number(d_.found, n.key, number_of(selection_.base.machine, n.key));
+      put_back(n.key, number_of(selection_.base.machine, n.key));
+  }
+
+  /// A number of what is not told becomes what it was.
+  void put_back(const std::string& key, double value) {
+    put_back_.emplace_back(key, value);
+    move_number(d_.found, key, value);
   }
 
   /// Declared numbers and where the piece lies were fitted beside what is not told: anew, without.
   void fit_what_is_told() {
-    LinearPart linear = without(found().nuisances, put_back_);
+    LinearPart linear = without(found().nuisances, held_);
     const Column residual = evidence_.residual(evidence_.predict(d_.found));
     const Ground ground(evidence_, residual, linear);
     const Eigen::VectorXd step =
@@ -526,9 +533,8 @@ class Report {
   void tell_events() {
     std::map<std::size_t, std::string> times;
     for (const LapEvent& e : evidence_.events())
-      times[e.axis] +=
-          fmt::format("{}{:.2f}", times.contains(e.axis) ? ", " : "",
-                      static_cast<double>(e.begin + e.end) / 2 * evidence_.record().period);
+      times[e.axis] += fmt::format("{}{:.2f}", times.contains(e.axis) ? ", " : "",
+                                   evidence_.record().time_of((e.begin + e.end) / 2));
     for (const auto& [axis, at] : times)
       d_.notes.push_back(fmt::format(
           "{} does not do the same in all laps about {} s, as an axis that stops in its friction "
@@ -657,6 +663,7 @@ class Report {
     if (law.gain < needed || (quiet && !withdrawn_)) return;
     d_.law = law.law;
     d_.found = law.machine;
+    for (const auto& [key, value] : put_back_) move_number(d_.found, key, value);
   }
 
   /// Of candidates, from those of the trials: the smallest size that is seen; of limits the
@@ -785,10 +792,10 @@ class Report {
         ratio > options_.model_form) {
       d_.model_form_share = before > 0 ? std::min(1.0, after / before) : 1;
       d_.warnings.push_back(fmt::format(
-          "Model form error: {:.0f} % of what the declared machine does not explain is still there "
+          "Model form error: {} of what the declared machine does not explain is still there "
           "({:.2f} times the noise). Against the declared machine alone no effect can be called "
           "the cause; compare with a healthy run of the same program.",
-          100 * d_.model_form_share, ratio));
+          percent(d_.model_form_share), ratio));
     }
   }
 
@@ -804,7 +811,9 @@ class Report {
   std::vector<std::string> pulled_;  ///< declared numbers that were, and are not found
   bool withdrawn_ = false, withheld_ = false;
   double told_held_out_ = selection_.found.held_out;  ///< chi-square that what is told leaves
-  std::vector<FreedNumber> put_back_;                 ///< released numbers that are not told
+  std::vector<FreedNumber> held_;                     ///< released numbers that are not told
+  std::vector<std::pair<std::string, double>>
+      put_back_;  ///< numbers of what is not told, as they were
   Diagnosis d_;
 };
 

@@ -4,8 +4,8 @@
 //
 //   NOT IDENTIFIABLE  nothing in the library would show, or there is too little to compare
 //   NO DEVIATION      nothing was found, c < 1.05 and no signal is still off
-//   EXPLAINED         something was found and c < 1.05, or at least 98 % of the excess is gone, no
-//                     signal is still off, and none is further off than without it
+//   EXPLAINED         something was found and explains what there was (verdict.hpp), no signal is
+//                     still off, and none is further off than without it
 //   PARTLY            something was found, but more is left
 //   UNEXPLAINED       something is left that no effect of the library makes: it repeats, or an axis
 //                     vibrates, or readings shift from lap to lap by three times their noise
@@ -18,7 +18,7 @@
 // In absolute mode c > 1.1 after the fit is model form error: what the model and the machine do
 // differently by themselves. Its share of the excess is told and no effect may be called a cause.
 // Without repeated motions noise is what the past of a remainder does not foretell of it
-// (noise_audit.hpp), and the words are the same.
+// (noise_audit.hpp), and no form is told.
 //
 // An effect that makes a signal worse, or a number that went to the end of what is allowed, is a
 // warning: it cannot be all of what is there.

@@ -44,7 +44,7 @@ struct SignalCurve {
 bool is_bare_encoder(const Record& record);
 
 /// The signals of all channels of the record that have a sine and a cosine. `declared` gives the
-/// signal period and receives what was found.
+/// signal period.
 Diagnosis diagnose_quadrature(const Record& record, const Machine& declared);
 
 }  // namespace vcnc

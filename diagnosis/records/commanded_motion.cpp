@@ -158,6 +158,13 @@ CommandedMotion commanded_motion(const Record& record) {
   return motion;
 }
 
+Record with_bridged_commands(Record record) {
+  std::vector<char> known(record.samples());
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::command) s.value = bridged(s.value, known, 0);
+  return record;
+}
+
 bool is_followed(const Record& record, std::size_t axis) {
   const bool probed = std::any_of(record.signals.begin(), record.signals.end(),
                                   [](const MeasuredSignal& s) { return is_reading(s.kind); });

@@ -52,6 +52,10 @@ struct CommandedMotion {
 
 CommandedMotion commanded_motion(const Record& record);
 
+/// The record with a command wherever one is missing, on a straight line. Its replica still knows
+/// that it was missing, and predicts nothing there.
+Record with_bridged_commands(Record record);
+
 /// Whether the drive of an axis is told to go where it was measured.
 bool is_followed(const Record& record, std::size_t axis);
 

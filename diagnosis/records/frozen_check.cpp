@@ -147,9 +147,7 @@ class FrozenSearch {
 };
 
 std::string told(const MeasuredSignal& s, const EqualRun& run, const Record& record) {
-  const auto at = [&](std::size_t k) {
-    return record.begin + static_cast<double>(k) * record.period;
-  };
+  const auto at = [&](std::size_t k) { return record.time_of(k); };
   return fmt::format("at {:.6g} (SI) from {:.3f} to {:.3f} s", s.value[run.begin], at(run.begin),
                      at(run.end));
 }

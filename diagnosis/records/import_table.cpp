@@ -9,23 +9,18 @@
 #include <set>
 
 #include "configs/config.hpp"
-#include "configs/spelling.hpp"
-#include "diagnosis/records/bar_course.hpp"
+#include "diagnosis/records/bar_readings.hpp"
+#include "diagnosis/records/map_columns.hpp"
 #include "diagnosis/records/position_jumps.hpp"
 #include "diagnosis/records/record_check.hpp"
 #include "diagnosis/records/signal_name.hpp"
 #include "diagnosis/records/stretches.hpp"
 #include "diagnosis/records/time_base.hpp"
+#include "diagnosis/records/told_laps.hpp"
 
 namespace vcnc {
 
 namespace {
-
-constexpr std::size_t kShortestLap = 50;  // samples
-constexpr double kMostOfArc = 0.9;        // of its readings must be there
-constexpr double kBreak = 0.1;            // [s] without readings
-constexpr double kOfArc = 1e-3;           // by which readings and an arc may end elsewhere
-constexpr double kBarRange = 5e-3;        // [m]; of bars there are, 1 to 2 mm
 
 using Kind = ImportMap::Kind;
 
@@ -40,7 +35,7 @@ class Importer {
  public:
   Importer(const MeasuredTable& table, const ImportMap& map, const std::string& map_name,
            const Machine* declared)
-      : table_(table), map_(map), map_name_(map_name), declared_(declared) {}
+      : table_(table), map_(map), by_map_(table, map, map_name), declared_(declared) {}
 
   Record record() {
     find_columns();
@@ -61,7 +56,7 @@ class Importer {
     if (map_.arcs.empty())
       for (const ImportMap::Signal& s : map_.signals) add(s);
     else
-      add_bar_on_arcs(map_.signals.front());
+      add_bar_on_arcs(by_map_, *columns_.front(), base_, record_);
     add_twists();
     check_record(record_, velocities_, declared_);
     cut();
@@ -71,93 +66,29 @@ class Importer {
  private:
   void warn(const std::string& sentence) { record_.warnings.push_back(sentence); }
 
-  [[noreturn]] void refuse(const KeyLines& lines, const std::string& path, std::string_view key,
-                           const std::string& reason) const {
-    const auto at = lines.find(key);
-    const auto whole = lines.find("");
-    const int line = at != lines.end() ? at->second : whole != lines.end() ? whole->second : 0;
-    throw ConfigError(fmt::format("{}: {}{}: {}",
-                                  line > 0 ? fmt::format("{}:{}", map_name_, line) : map_name_,
-                                  path, key, reason));
-  }
-
-  const MeasuredColumn& find(const std::string& name, int number, const KeyLines& lines,
-                             const std::string& path, std::string_view key) const {
-    if (number > 0) {
-      const auto i = static_cast<std::size_t>(number);
-      if (i > table_.columns.size())
-        refuse(lines, path, key,
-               fmt::format("column {} is not there, {} has {}", number, table_.source,
-                           table_.columns.size()));
-      return usable(table_.columns[i - 1]);
-    }
-    const MeasuredColumn* found = nullptr;
-    for (const MeasuredColumn& c : table_.columns) {
-      if (c.name != name) continue;
-      if (found)
-        refuse(
-            lines, path, key,
-            fmt::format("{} has two columns \"{}\"; say which by its number", table_.source, name));
-      found = &c;
-    }
-    if (!found)
-      refuse(lines, path, key,
-             fmt::format("\"{}\" is no column of {}{}", name, table_.source, suggestion(name)));
-    return usable(*found);
-  }
-
-  const MeasuredColumn& usable(const MeasuredColumn& c) const {
-    if (c.bad_line > 0) {
-      const bool of_digits = c.bad_text.find_first_of("0123456789") != c.bad_text.npos;
-      throw MeasurementError(fmt::format(
-          "{}:{}: \"{}\" in column \"{}\" is no number; {}", table_.source, c.bad_line, c.bad_text,
-          c.name,
-          of_digits
-              ? "only digits, a sign, one decimal point and an exponent make one"
-              : fmt::format("if it means that there is none, say so in the map: missing = [\"{}\"]",
-                            c.bad_text)));
-    }
-    if (c.value.empty()) throw MeasurementError(table_.source + ": holds no rows");
-    return c;
-  }
-
-  std::string suggestion(const std::string& name) const {
-    const MeasuredColumn* best = nullptr;
-    std::size_t least = name.size() / 3 + 1;
-    for (const MeasuredColumn& c : table_.columns)
-      if (const std::size_t edits = edit_distance(name, c.name); edits < least)
-        least = edits, best = &c;
-    if (best) return fmt::format("; did you mean \"{}\"?", best->name);
-    constexpr std::size_t kMost = 20;
-    std::string all;
-    for (std::size_t i = 0; i < std::min(kMost, table_.columns.size()); ++i)
-      all += (all.empty() ? "" : ", ") + table_.columns[i].name;
-    return "; it has " + all + (table_.columns.size() > kMost ? ", ..." : "");
-  }
-
   void find_columns() {
     std::map<const MeasuredColumn*, std::string> used;
     const auto use = [&](const MeasuredColumn& c, const KeyLines& lines, const std::string& path,
                          std::string_view key, const std::string& as) {
       const auto [known, fresh] = used.emplace(&c, as);
       if (!fresh)
-        refuse(lines, path, key,
-               fmt::format("column \"{}\" is used as {} already", c.name, known->second));
+        by_map_.refuse(lines, path, key,
+                       fmt::format("column \"{}\" is used as {} already", c.name, known->second));
       rows_ = rows_ == 0 ? c.value.size() : rows_;
       if (c.value.size() != rows_)
-        refuse(lines, path, key,
-               fmt::format("column \"{}\" has {} rows, the others have {}", c.name, c.value.size(),
-                           rows_));
+        by_map_.refuse(lines, path, key,
+                       fmt::format("column \"{}\" has {} rows, the others have {}", c.name,
+                                   c.value.size(), rows_));
     };
     const ImportMap::Time& t = map_.time;
     if (t.rate == 0) {
       const std::string_view key = t.number > 0 ? "number" : "column";
-      time_ = &find(t.column, t.number, t.lines, "time.", key);
+      time_ = &by_map_.find(t.column, t.number, t.lines, "time.", key);
       use(*time_, t.lines, "time.", key, "time");
     }
     for (const ImportMap::Signal& s : map_.signals) {
       const std::string_view key = s.number > 0 ? "number" : "column";
-      columns_.push_back(&find(s.column, s.number, s.lines, "signals.", key));
+      columns_.push_back(&by_map_.find(s.column, s.number, s.lines, "signals.", key));
       use(*columns_.back(), s.lines, "signals.", key,
           fmt::format("{}{}", to_string(s.kind), s.axis.empty() ? "" : " of " + s.axis));
     }
@@ -200,8 +131,8 @@ class Importer {
       missing += !std::isfinite(column.value[i]);
     }
     if (missing == rows_)
-      refuse(s.lines, "signals.", s.number > 0 ? "number" : "column",
-             fmt::format("column \"{}\" holds no value", column.name));
+      by_map_.refuse(s.lines, "signals.", s.number > 0 ? "number" : "column",
+                     fmt::format("column \"{}\" holds no value", column.name));
     if (missing > 0)
       warn(fmt::format("\"{}\": {} of {} values are missing and stay missing", column.name, missing,
                        rows_));
@@ -249,7 +180,8 @@ class Importer {
         signal.kind = SignalKind::temperature;
         signal.axis = temperatures_++;
         if (signal.axis >= kAxisCount)
-          refuse(s.lines, "signals.", "kind", fmt::format("more than {} temperatures", kAxisCount));
+          by_map_.refuse(s.lines, "signals.", "kind",
+                         fmt::format("more than {} temperatures", kAxisCount));
         break;
       case Kind::clock:
         signal.kind = SignalKind::clock;
@@ -258,140 +190,6 @@ class Importer {
     if (signal.kind == SignalKind::position || signal.kind == SignalKind::command)
       check_jumps(column, s.kind);
     record_.signals.push_back(std::move(signal));
-  }
-
-  /// A bar and the commands of its arcs, on the time base of these.
-  void add_bar_on_arcs(const ImportMap::Signal& s) {
-    const ImportMap::Bar& bar = map_.bar;
-    std::vector<BarArc> arcs;
-    for (const ImportMap::Arc& a : map_.arcs) arcs.push_back({a.from, a.start, a.sweep});
-    std::vector<double> time;
-    for (const std::size_t index : base_.index)
-      time.push_back(base_.begin + static_cast<double>(index) * base_.period);
-    check_length(*columns_.front(), s);
-    check_arcs(*columns_.front(), time);
-    const BarCourse course = bar_course(arcs, bar.feed / bar.radius, time, base_.period);
-    if (course.later > base_.period)
-      warn(
-          fmt::format("the last arc comes {:.3g} s later than the table says: an axis must stop, "
-                      "turn round and be at its feed between two arcs",
-                      course.later));
-    record_.begin = course.begin;
-    MeasuredSignal length{SignalKind::bar, 0, columns_.front()->name,
-                          std::vector<double>(course.angle.size(), kMissing)};
-    for (std::size_t i = 0; i < rows_; ++i)
-      if (course.sample[i] != BarCourse::kNone)
-        length.value[course.sample[i]] = to_si(s, columns_.front()->value[i]);
-    using Plane = ImportMap::Bar::Plane;
-    const std::size_t one = bar.plane == Plane::ZX   ? kZ
-                            : bar.plane == Plane::YZ ? kY
-                                                     : kX,
-                      other = bar.plane == Plane::ZX   ? kX
-                              : bar.plane == Plane::YZ ? kZ
-                                                       : kY;
-    for (const std::size_t axis : {kX, kY, kZ}) {
-      MeasuredSignal command{SignalKind::command, axis, "arcs", {}};
-      for (const double angle : course.angle)
-        command.value.push_back(bar.centre[static_cast<Eigen::Index>(axis)] +
-                                (axis == one     ? bar.radius * std::cos(angle)
-                                 : axis == other ? bar.radius * std::sin(angle)
-                                                 : 0));
-      record_.signals.push_back(std::move(command));
-    }
-    record_.signals.push_back(std::move(length));
-  }
-
-  /// A bar that reads more than its range is of another unit, or tells its whole length.
-  void check_length(const MeasuredColumn& c, const ImportMap::Signal& s) const {
-    double sum = 0, most = 0;
-    std::size_t there = 0, at = 0;
-    for (std::size_t i = 0; i < rows_; ++i) {
-      const double v = to_si(s, c.value[i]);
-      if (!std::isfinite(v)) continue;
-      sum += v, ++there;
-      if (std::abs(v) > most) most = std::abs(v), at = i;
-    }
-    if (there == 0)
-      throw MeasurementError(fmt::format("{}: \"{}\" has no value at all", table_.source, c.name));
-    if (most <= kBarRange) return;
-    const bool whole = std::abs(sum / static_cast<double>(there) - map_.bar.radius) < kBarRange;
-    throw MeasurementError(fmt::format(
-        "{}: \"{}\" (bar) is {:.4g} mm, and no ball bar moves by more than {:.0f} mm; {}",
-        table_.place(at), c.name, 1e3 * most, 1e3 * kBarRange,
-        whole ? "this is its whole length: take its radius off by offset"
-              : "check its unit and scale"));
-  }
-
-  /// Readings of an arc and around it, up to the next break.
-  struct Block {
-    double first = 0, last = 0;      ///< reading of the arc [s]
-    double begin = 0, end = 0;       ///< with those before and after it
-    double there = 0, expected = 0;  ///< readings within the arc
-  };
-
-  /// `time`: of every reading; `from` to `to`: the arc.
-  Block block_of(const std::vector<double>& time, double from, double to) const {
-    const double edge = 0.5 * base_.period, broken = kBreak + 2 * base_.period;
-    auto begin = std::lower_bound(time.begin(), time.end(), from - edge),
-         end = std::upper_bound(time.begin(), time.end(), to + edge);
-    Block b{.there = static_cast<double>(end - begin), .expected = (to - from) / base_.period + 1};
-    if (begin == end) return b;
-    b.first = *begin;
-    b.last = *(end - 1);
-    while (begin != time.begin() && *begin - *(begin - 1) < broken) --begin;
-    while (end != time.end() && *end - *(end - 1) < broken) ++end;
-    b.begin = *begin;
-    b.end = *(end - 1);
-    return b;
-  }
-
-  /// An arc is where its readings are: that one begins or ends elsewhere is a mistake in its time,
-  /// sweep, radius or feed, and shifts the angle of every reading.
-  void check_arcs(const MeasuredColumn& c, const std::vector<double>& time_of_row) {
-    std::vector<double> time;
-    for (std::size_t i = 0; i < rows_; ++i)
-      if (std::isfinite(c.value[i])) time.push_back(time_of_row[i]);
-    for (const ImportMap::Arc& arc : map_.arcs) {
-      const double to = arc.from + std::abs(arc.sweep) * map_.bar.radius / map_.bar.feed;
-      const double near = std::max(3 * base_.period, kOfArc * (to - arc.from));
-      const Block b = block_of(time, arc.from, to);
-      const auto no = [&](const std::string& reason) {
-        refuse(arc.lines, "arcs.", "from_s", reason);
-      };
-      if (b.there < kMostOfArc * b.expected)
-        no(
-            fmt::format("from {:.3f} to {:.3f} s there are {:.0f} of {:.0f} readings; check times, "
-                        "angles, radius and feed",
-                        arc.from, to, b.there, b.expected));
-      if (b.first > arc.from + near)
-        no(
-            fmt::format("the first reading of this arc is at {:.3f} s, later than {:.3f} s; give "
-                        "the time and the angle of that",
-                        b.first, arc.from));
-      if (b.last < to - near)
-        no(fmt::format(
-            "the last reading of this arc is at {:.3f} s, but by sweep, radius and feed "
-            "it ends at {:.3f} s",
-            b.last, to));
-      const bool begins = b.begin > arc.from - near, ends = b.end < to + near;
-      if (begins && !ends)
-        no(fmt::format(
-            "this arc begins with its readings and ends by sweep, radius and feed at "
-            "{:.3f} s, but they go on without a break to {:.3f} s; if these are of it a "
-            "feed of {:.6g} mm/min fits, else leave them out of the table",
-            to, b.end, map_.bar.feed * 6e4 * (to - arc.from) / (b.end - arc.from)));
-      if (ends && !begins)
-        no(
-            fmt::format("this arc ends with its readings and begins at {:.3f} s, but they come "
-                        "without a break from {:.3f} s on; check from_s and feed, or leave out of "
-                        "the table what is not of it",
-                        arc.from, b.begin));
-      if (b.there < b.expected - 1.5)
-        warn(
-            fmt::format("from {:.3f} to {:.3f} s {:.0f} of {:.0f} readings are missing and stay "
-                        "missing",
-                        arc.from, to, b.expected - b.there, b.expected));
-    }
   }
 
   void check_jumps(const MeasuredColumn& c, Kind kind) const {
@@ -490,8 +288,7 @@ class Importer {
       throw MeasurementError(fmt::format(
           "{}: \"{}\" stays at {:.6g} (SI) from {:.3f} s on while \"{}\" goes on: a measuring "
           "system that failed, or a column that was not written",
-          table_.source, stays.source, stays.value[*begin],
-          record_.begin + static_cast<double>(*begin) * record_.period, moves.source));
+          table_.source, stays.source, stays.value[*begin], record_.time_of(*begin), moves.source));
   }
 
   static std::pair<double, double> range_of(const std::vector<double>& value) {
@@ -515,10 +312,8 @@ class Importer {
   }
 
   void cut() {
-    if (!map_.laps.empty())
-      cut_by_times();
-    else if (!map_.lap_column.empty())
-      cut_by_column();
+    if (!map_.laps.empty() || !map_.lap_column.empty())
+      add_told_laps(by_map_, base_, record_);
     else if (map_.detect_laps)
       record_.stretches = stretches_of(record_);
     std::map<int, int> repetitions;
@@ -531,73 +326,9 @@ class Importer {
       warn("no motion is repeated: noise can only be estimated from the residual itself");
   }
 
-  void cut_by_times() {
-    std::map<std::string, std::pair<int, int>> known;  // condition: number, repetitions
-    for (const ImportMap::Lap& lap : map_.laps) {
-      const double from = (lap.from - base_.begin) / base_.period;
-      const double to = (lap.to - base_.begin) / base_.period;
-      const auto last = static_cast<double>(base_.samples);
-      if (to <= 0 || from >= last)
-        refuse(lap.lines, "laps.", "from_s",
-               fmt::format("the lap lies outside the run, {:.3f} .. {:.3f} s", base_.begin,
-                           base_.begin + (last - 1) * base_.period));
-      const std::string name = lap.condition.empty()
-                                   ? fmt::format("lap {}", record_.stretches.size() + 1)
-                                   : lap.condition;
-      auto& [number, repetition] =
-          known.emplace(name, std::pair(static_cast<int>(known.size()), 0)).first->second;
-      const auto begin = static_cast<std::size_t>(std::clamp(std::round(from), 0.0, last)),
-                 end = static_cast<std::size_t>(std::clamp(std::round(to), 0.0, last));
-      if (end < begin + kShortestLap)
-        refuse(lap.lines, "laps.", "to_s", too_short(end > begin ? end - begin : 0));
-      record_.stretches.push_back({begin, end, number, repetition++, name});
-    }
-  }
-
-  static std::string too_short(std::size_t samples) {
-    return fmt::format("a lap has {} samples of the run; at least {} are needed to tell its noise",
-                       samples, kShortestLap);
-  }
-
-  void cut_by_column() {
-    const MeasuredColumn& laps = find(map_.lap_column, 0, map_.lines, "", "lap_column");
-    const MeasuredColumn* conditions =
-        map_.condition_column.empty()
-            ? nullptr
-            : &find(map_.condition_column, 0, map_.lines, "", "condition_column");
-    for (const MeasuredColumn* c : {&laps, conditions})
-      if (c && c->value.size() != rows_)
-        refuse(map_.lines, "", "lap_column",
-               fmt::format("column \"{}\" has {} rows, the others have {}", c->name,
-                           c->value.size(), rows_));
-    std::map<double, std::pair<int, int>> known;
-    const auto differ = [](double a, double b) {
-      return std::isfinite(a) || std::isfinite(b) ? !(a == b) : false;
-    };
-    std::size_t begin = 0;
-    for (std::size_t i = 1; i <= rows_; ++i) {
-      const bool ends = i == rows_ || differ(laps.value[i], laps.value[i - 1]) ||
-                        (conditions && differ(conditions->value[i], conditions->value[i - 1]));
-      if (!ends) continue;
-      if (std::isfinite(laps.value[begin])) {
-        const double of = conditions ? conditions->value[begin] : 0;
-        auto& [number, repetition] =
-            known.emplace(std::isfinite(of) ? of : 0, std::pair(static_cast<int>(known.size()), 0))
-                .first->second;
-        const std::size_t first = base_.index[begin], end = base_.index[i - 1] + 1;
-        if (end < first + kShortestLap)
-          refuse(map_.lines, "", "lap_column", too_short(end - first));
-        record_.stretches.push_back(
-            {first, end, number, repetition++,
-             conditions ? fmt::format("{} {:g}", conditions->name, of) : "lap"});
-      }
-      begin = i;
-    }
-  }
-
   const MeasuredTable& table_;
   const ImportMap& map_;
-  const std::string& map_name_;
+  MapColumns by_map_;
   const Machine* declared_;
   const MeasuredColumn* time_ = nullptr;
   std::vector<const MeasuredColumn*> columns_;  // of each signal of the map

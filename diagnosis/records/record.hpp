@@ -88,6 +88,8 @@ struct Record {
   std::optional<OnTable> on_table;  ///< what was read; none: a probe on the piece
 
   std::size_t samples() const { return signals.empty() ? 0 : signals.front().value.size(); }
+  /// By the clock of the table [s], to tell it. The time of a model begins with the record.
+  double time_of(std::size_t sample) const { return begin + static_cast<double>(sample) * period; }
   /// Null where there is none.
   const MeasuredSignal* find(SignalKind kind, std::size_t axis) const {
     for (const MeasuredSignal& s : signals)

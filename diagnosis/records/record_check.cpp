@@ -189,8 +189,7 @@ class Checker {
         fmt::format("{}: {} alone far off the values before and after, the first by {:.4g} (SI) "
                     "at {:.6g} s; if {} not measured, say so by missing = [...] in the map",
                     name(s), count == 1 ? "1 value stands" : fmt::format("{} values stand", count),
-                    off, record_.begin + static_cast<double>(first) * record_.period,
-                    count == 1 ? "it was" : "they were"));
+                    off, record_.time_of(first), count == 1 ? "it was" : "they were"));
   }
 
   /// Warns of one value that comes more than once, far off all others: it means there is none.
@@ -389,8 +388,7 @@ class Checker {
       refuse(
           fmt::format("{} stays at {:.6g} from {:.3f} s on while {} goes on: a measuring system "
                       "that failed, or a column that was not written",
-                      name(s), s.value[*begin],
-                      record_.begin + static_cast<double>(*begin) * record_.period, name(command)));
+                      name(s), s.value[*begin], record_.time_of(*begin), name(command)));
   }
 
   void check_command(const MeasuredSignal& s) {

@@ -1,6 +1,8 @@
 #include "diagnosis/records/record_file.hpp"
 
 #include <algorithm>
+#include <cstring>
+#include <fstream>
 #include <optional>
 #include <sstream>
 
@@ -170,9 +172,23 @@ Record read_record(const std::filesystem::path& path) {
   return record;
 }
 
+namespace {
+
+/// HDF5 is not asked about a damaged file.
+bool says_format(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const std::string format = kRecordFormat;
+  for (std::size_t at = 0; (at = bytes.find(format, at)) != bytes.npos; at += format.size())
+    if (bytes.compare(at, std::strlen(kFormat), kFormat) != 0) return true;
+  return false;
+}
+
+}  // namespace
+
 bool is_record_file(const std::filesystem::path& path) {
   if (!looks_like_hdf5(path)) return false;
-  if (seal_of(path) != Seal::intact) return false;
+  if (seal_of(path) != Seal::intact) return says_format(path);
   const Quiet quiet;
   const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
   std::string format;

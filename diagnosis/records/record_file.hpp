@@ -21,7 +21,7 @@ void write_record(const Record& record, const std::filesystem::path& path);
 /// Throws MeasurementError.
 Record read_record(const std::filesystem::path& path);
 
-/// Whether the file says it is a record.
+/// Whether the file says it is a record, damaged or not.
 bool is_record_file(const std::filesystem::path& path);
 
 }  // namespace vcnc

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "diagnosis/records/commanded_motion.hpp"
@@ -22,6 +22,9 @@ constexpr double kShortestStretch = 0.1;  // [s]
 constexpr double kLeastTravel = 2e-3;     // [m or rad] of a lap
 constexpr double kSearchStep = 20e-3;     // [s] between samples at which a lap may begin
 constexpr std::size_t kShares = 16;       // at which stretches are compared
+// Of two laps that are apart by more than this part of their way, or by more than this [m or rad]
+// where there is none, one does another motion.
+constexpr double kOtherWay = 0.1, kNoWay = 1e-3;
 
 /// The commanded motion as a curve in the space of the axes.
 class Curve5 {
@@ -258,7 +261,37 @@ class Segmentation {
   std::vector<Stretch> stretches_;
 };
 
+/// Standard deviation; 0 where there is nothing.
+double deviation(const std::vector<double>& values) {
+  const auto n = static_cast<double>(std::max<std::size_t>(values.size(), 1));
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
+  double sum = 0;
+  for (const double v : values) sum += (v - mean) * (v - mean);
+  return std::sqrt(sum / n);
+}
+
+/// Where an axis was told to be, else where it was; null: neither is known.
+const MeasuredSignal* way_of(const Record& record, std::size_t axis) {
+  const MeasuredSignal* told = record.find(SignalKind::command, axis);
+  return told ? told : record.find(SignalKind::position, axis);
+}
+
 }  // namespace
+
+bool same_way(const Record& a, const Stretch& of_a, const Record& b, const Stretch& of_b) {
+  const std::size_t n = std::min(of_a.end - of_a.begin, of_b.end - of_b.begin);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const MeasuredSignal *way_a = way_of(a, axis), *way_b = way_of(b, axis);
+    if (!way_a || !way_b) continue;
+    std::vector<double> x, apart;
+    for (std::size_t k = 0; k < n; ++k) {
+      const double p = way_a->value[of_a.begin + k], q = way_b->value[of_b.begin + k];
+      if (std::isfinite(p) && std::isfinite(q)) x.push_back(p), apart.push_back(q - p);
+    }
+    if (deviation(apart) > kOtherWay * deviation(x) + kNoWay) return false;
+  }
+  return true;
+}
 
 std::vector<char> moving(const Record& record, std::size_t axis) {
   const std::size_t n = record.samples();

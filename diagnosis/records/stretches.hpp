@@ -26,4 +26,8 @@ std::vector<char> moving(const Record& record, std::size_t axis);
 /// In order of time, not overlapping; empty where no command is known.
 std::vector<Stretch> stretches_of(const Record& record);
 
+/// Whether all axes go the same way in both, from wherever they begin, as far as the shorter one
+/// lasts: where they were told to be, else where they were.
+bool same_way(const Record& a, const Stretch& of_a, const Record& b, const Stretch& of_b);
+
 }  // namespace vcnc

@@ -12,6 +12,7 @@ namespace {
 
 /// A grid of more than this share of holes is none.
 constexpr double kMostLost = 0.5;
+constexpr double kNought = 1e-6;  ///< of a period
 
 double median_step(const std::vector<double>& time) {
   std::vector<double> steps(time.size() - 1);
@@ -98,8 +99,9 @@ TimeBase time_base(const std::vector<double>& time, double tolerance, const Meas
         table.place(grid.worst_at), grid.outside, time.size(), grid.period * 1e3, tolerance * 100,
         grid.worst * 1e3));
   TimeBase base;
-  base.begin = time.front() + grid.shift;
   base.period = grid.period;
+  base.begin = time.front() + grid.shift;
+  if (std::abs(base.begin) < kNought * base.period) base.begin = 0;
   base.jitter = grid.jitter;
   base.worst = grid.worst;
   for (const double step : step_of) base.index.push_back(static_cast<std::size_t>(step));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <list>
 #include <map>
+#include <mutex>
 #include <stdexcept>
 
 #include "diagnosis/records/series.hpp"
@@ -173,7 +174,7 @@ struct MachineReplica::Anchor {
 MachineReplica::MachineReplica(const Record& record, const Machine& declared,
                                const std::optional<PieceParams>& piece)
     : declared_(declared), period_(record.period), samples_(record.samples()) {
-  if (samples_ < 2) throw std::invalid_argument(record.source + ": holds no motion");
+  if (samples_ < 2) throw std::invalid_argument("holds no motion");
   const CommandedMotion motion = commanded_motion(record);
   channels_ = channels_of(record, motion);
   probes_ = std::any_of(channels_.begin(), channels_.end(),

@@ -31,9 +31,7 @@
 // the record is off the anchor's reading, as a mean over 10 ms before and after.
 #pragma once
 
-#include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -50,7 +48,7 @@ namespace vcnc {
 class MachineReplica : public Replica {
  public:
   /// Predicts the channels that `record` has and that its commands say something of. Throws
-  /// std::invalid_argument where the piece cannot be built.
+  /// std::invalid_argument where the piece cannot be built or nothing moves: less than two samples.
   MachineReplica(const Record& record, const Machine& declared,
                  const std::optional<PieceParams>& piece);
   ~MachineReplica() override;

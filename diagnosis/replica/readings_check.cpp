@@ -80,7 +80,7 @@ void check_unit_of_one(const Record& record, const Reading& reading) {
       record.source, name(*reading.measured), *factor, mistake));
 }
 
-/// Axes that are taken to stand at 0.
+/// Axes that are taken to be where they were measured, or to stand where the machine begins.
 std::string without_commands(const Record& record) {
   std::string axes;
   for (std::size_t i = 0; i < kAxisCount; ++i)

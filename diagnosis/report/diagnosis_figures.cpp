@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "analysis/figure_style.hpp"
 #include "diagnosis/report/shown_law.hpp"
@@ -95,12 +94,12 @@ std::string quoted_label(std::string text) {
 std::string residual_figure(const Record& record, const ModelResiduals& residuals,
                             const std::vector<std::size_t>& channels) {
   const auto rows = static_cast<double>(channels.size());
-  std::string text =
-      heading(900, 110 + 150 * static_cast<int>(channels.size())) + "set multiplot\n" +
-      fmt::format(
-          "set xrange [{:.9g}:{:.9g}]\nset key at graph 1,graph 1.25 "
-          "noopaque\n",
-          record.begin, record.begin + static_cast<double>(record.samples()) * record.period);
+  std::string text = heading(900, 110 + 150 * static_cast<int>(channels.size())) +
+                     "set multiplot\n" +
+                     fmt::format(
+                         "set xrange [{:.9g}:{:.9g}]\nset key at graph 1,graph 1.25 "
+                         "noopaque\n",
+                         record.begin, record.time_of(record.samples()));
   const double top = 1 - 0.3 / (rows + 0.7), bottom = 0.4 / (rows + 0.7);
   const double height = (top - bottom) / rows;
   for (std::size_t i = 0; i < channels.size(); ++i) {
@@ -151,8 +150,7 @@ std::vector<RelatedQuantity> related_quantities(const Record& record) {
                    {}});
   }
   RelatedQuantity time{.name = "time", .unit = "s", .value = {}, .speed = {}};
-  for (std::size_t k = 0; k < record.samples(); ++k)
-    time.value.push_back(record.begin + static_cast<double>(k) * record.period);
+  for (std::size_t k = 0; k < record.samples(); ++k) time.value.push_back(record.time_of(k));
   all.push_back(std::move(time));
   return all;
 }
@@ -231,8 +229,7 @@ std::string ladder_figure(const std::vector<Rung>& ladder) {
                      "$ladder << EOD\n";
   double most = 0, least = HUGE_VAL;
   for (std::size_t i = 0; i < ladder.size(); ++i) {
-    text += fmt::format("\"{}\" {:.6g} {}\n",
-                        ladder[i].added.empty() ? "declared machine" : "+ " + ladder[i].added,
+    text += fmt::format("\"{}\" {:.6g} {}\n", i == 0 ? "declared machine" : "+ " + ladder[i].added,
                         std::max(ladder[i].chi2, 1e-3), i);
     most = std::max(most, ladder[i].chi2);
     least = std::min(least, std::max(ladder[i].chi2, 1e-3));

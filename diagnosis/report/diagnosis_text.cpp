@@ -37,6 +37,10 @@ std::string with_interval(const FittedNumber& n) {
                      digits);
 }
 
+std::string percent(double share) {
+  return share < 0.01 ? fmt::format("{:.1g} %", share * 100) : fmt::format("{:.0f} %", share * 100);
+}
+
 std::string verdict_sentence(const Diagnosis& d) {
   switch (d.verdict) {
     case DiagnosisVerdict::explained:
@@ -53,10 +57,9 @@ std::string verdict_sentence(const Diagnosis& d) {
           "what was added explains {} % of what was to be explained{}",
           d.explained_share < 0.995 ? fmt::format("{:.0f}", d.explained_share * 100) : "over 99",
           d.model_form_share > 0
-              ? fmt::format(
-                    "; {:.0f} % is an error of the model's form, so what is named goes along "
-                    "with it and need not be its cause",
-                    d.model_form_share * 100)
+              ? fmt::format("; {} is an error of the model's form, so what is named goes along "
+                            "with it and need not be its cause",
+                            percent(d.model_form_share))
               : "");
     case DiagnosisVerdict::unexplained:
       if (d.law) return d.law->words;

@@ -19,4 +19,7 @@ std::string verdict_sentence(const Diagnosis& diagnosis);
 /// Value with as many digits as its interval deserves.
 std::string with_interval(const FittedNumber& number);
 
+/// A share in percent: whole ones, below 1 the first digit that is not nought.
+std::string percent(double share);
+
 }  // namespace vcnc

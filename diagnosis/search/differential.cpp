@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <tuple>
 #include <utility>
 
 #include "diagnosis/records/any_record.hpp"
@@ -13,6 +11,7 @@
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/records/series.hpp"
 #include "diagnosis/records/signal_name.hpp"
+#include "diagnosis/records/stretches.hpp"
 #include "diagnosis/search/controller_check.hpp"
 #include "diagnosis/search/controller_lags.hpp"
 #include "diagnosis/search/evidence.hpp"
@@ -26,9 +25,6 @@ namespace {
 
 /// Lengths of laps of one condition differ by their start within a sample.
 constexpr std::size_t kSlack = 3;
-/// Of two laps that are apart by more than this part of their way, or by more than this [m or rad]
-/// where there is none, one does another motion.
-constexpr double kOtherWay = 0.1, kNoWay = 1e-3;
 /// A reading is not told where it is off by more than this, of its roughness, and by more than
 /// this, of what it usually is: a model that is wrong by a little everywhere cancels.
 constexpr double kUntold = 20, kFarOff = 5;
@@ -66,15 +62,6 @@ std::string measured_by(const Record& record) {
   for (const MeasuredSignal& s : record.signals)
     if (is_compared(s.kind)) names += (names.empty() ? "" : ", ") + signal_name(s.kind, s.axis);
   return names.empty() ? "nothing" : names;
-}
-
-/// Standard deviation; 0 where there is nothing.
-double deviation(const std::vector<double>& values) {
-  const auto n = static_cast<double>(std::max<std::size_t>(values.size(), 1));
-  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
-  double sum = 0;
-  for (const double v : values) sum += (v - mean) * (v - mean);
-  return std::sqrt(sum / n);
 }
 
 /// RMS of what the healthy machine is off the healthy run where it is told, per channel.
@@ -148,28 +135,6 @@ Record without_outliers(Record record, const Replica& replica, const Machine& de
     }
   }
   return record;
-}
-
-/// Where an axis was told to be, else where it was; null: neither is known.
-const MeasuredSignal* way_of(const Record& record, std::size_t axis) {
-  const MeasuredSignal* told = record.find(SignalKind::command, axis);
-  return told ? told : record.find(SignalKind::position, axis);
-}
-
-/// Whether all axes go the same way in two laps of nearly the same length, wherever it begins.
-bool same_way(const Record& a, const Stretch& of_a, const Record& b, const Stretch& of_b) {
-  const std::size_t n = std::min(of_a.end - of_a.begin, of_b.end - of_b.begin);
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    const MeasuredSignal *way_a = way_of(a, axis), *way_b = way_of(b, axis);
-    if (!way_a || !way_b) continue;
-    std::vector<double> x, apart;
-    for (std::size_t k = 0; k < n; ++k) {
-      const double p = way_a->value[of_a.begin + k], q = way_b->value[of_b.begin + k];
-      if (std::isfinite(p) && std::isfinite(q)) x.push_back(p), apart.push_back(q - p);
-    }
-    if (deviation(apart) > kOtherWay * deviation(x) + kNoWay) return false;
-  }
-  return true;
 }
 
 /// Laps of a healthy run that do the same as a lap of another.
@@ -330,6 +295,7 @@ HealthyRun healthy_run_with_forces(const Record& record, MachineReplica& replica
 }
 
 bool same_program(const Record& now, const Record& healthy) {
+  if (now.stretches.empty()) return false;
   return std::none_of(now.stretches.begin(), now.stretches.end(),
                       [&](const Stretch& s) { return partners(now, s, healthy).empty(); });
 }
@@ -350,30 +316,35 @@ std::vector<double> DifferentialRecord::noise_scales(
   return all;
 }
 
-DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
-  check_known_forces(now, healthy.record);
-  for (const Record* of : {&now, &healthy.record})
+void check_comparable(const Record& now, const Record& healthy) {
+  check_known_forces(now, healthy);
+  for (const Record* of : {&now, &healthy})
     if (of->stretches.empty())
       throw MeasurementError(of->source +
                              ": its laps are not known, and only laps of the same motion can be "
                              "compared with a healthy run; give them in the map ([[laps]] or "
                              "lap_column)");
-  check_same_kinematics(now, healthy.record);
+  check_same_kinematics(now, healthy);
+  if (std::all_of(now.stretches.begin(), now.stretches.end(),
+                  [&](const Stretch& lap) { return partners(now, lap, healthy).empty(); }))
+    throw MeasurementError(healthy.source + ": does none of the motions of " + now.source +
+                           "; a healthy run needs the same program");
+  if (std::none_of(now.signals.begin(), now.signals.end(), [&](const MeasuredSignal& s) {
+        return is_compared(s.kind) && healthy.find(s.kind, s.axis);
+      }))
+    throw MeasurementError(fmt::format(
+        "{}: measures {}, {} measures {}: no signal in common; a healthy run needs the same "
+        "columns",
+        healthy.source, measured_by(healthy), now.source, measured_by(now)));
+}
+
+DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
+  check_comparable(now, healthy.record);
   Pairings pairings;
   for (const Stretch& lap : now.stretches)
     pairings.push_back({&lap, partners(now, lap, healthy.record)});
   const std::size_t unmatched = static_cast<std::size_t>(
       std::erase_if(pairings, [](const Pairing& p) { return p.healthy.empty(); }));
-  if (pairings.empty())
-    throw MeasurementError(healthy.record.source + ": does none of the motions of " + now.source +
-                           "; a healthy run needs the same program");
-  if (std::none_of(now.signals.begin(), now.signals.end(), [&](const MeasuredSignal& s) {
-        return is_compared(s.kind) && healthy.record.find(s.kind, s.axis);
-      }))
-    throw MeasurementError(fmt::format(
-        "{}: measures {}, {} measures {}: no signal in common; a healthy run needs the same "
-        "columns",
-        healthy.record.source, measured_by(healthy.record), now.source, measured_by(now)));
   DifferentialRecord result{.record = now, .noise = healthy.noise, .healthy = healthy.machine};
   for (MeasuredSignal& signal : result.record.signals) {
     if (!is_compared(signal.kind)) continue;

@@ -62,10 +62,14 @@ HealthyRun healthy_run(const Record& record, Replica& replica, const Machine& de
 HealthyRun healthy_run_with_forces(const Record& record, MachineReplica& replica,
                                    const Machine& declared);
 
-/// Whether every motion of a run has a partner in the healthy one.
+/// Whether every motion of a run has a partner in the healthy one; never where none is known.
 bool same_program(const Record& now, const Record& healthy);
 
-/// Throws MeasurementError where the two know other forces of the test.
+/// Throws MeasurementError where a healthy run cannot be held against this one: it does none of its
+/// motions, has no signal in common, is of another kinematics, or knows other forces of the test.
+void check_comparable(const Record& now, const Record& healthy);
+
+/// Throws as check_comparable().
 DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy);
 
 }  // namespace vcnc

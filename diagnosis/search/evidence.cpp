@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "diagnosis/records/commanded_motion.hpp"
 #include "diagnosis/search/column_products.hpp"
 #include "diagnosis/search/comparable.hpp"
 #include "diagnosis/search/parallel.hpp"
@@ -75,7 +76,7 @@ Machine without_slip(Machine machine) {
 
 Evidence::Evidence(const Record& record, Replica& replica, const Machine& declared,
                    std::vector<double> noise_scale, const std::vector<double>& form)
-    : record_(record),
+    : record_(with_bridged_commands(record)),
       replica_(replica),
       gathering_(replica),
       partition_(vcnc::partition(record)),
@@ -87,7 +88,7 @@ Evidence::Evidence(const Record& record, Replica& replica, const Machine& declar
     if (!signal) throw std::logic_error("a replica predicts a channel that the record has not");
     measured_.push_back(signal->value);
   }
-  raw_valid_ = comparable_samples(record, replica.channels(), measured_, declared_,
+  raw_valid_ = comparable_samples(record_, replica.channels(), measured_, declared_,
                                   replica.predict(without_slip(declared)));
   difference_ = measured_;
   for (std::size_t c = 0; c < difference_.size(); ++c)

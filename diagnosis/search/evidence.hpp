@@ -47,7 +47,7 @@ class Evidence {
   /// `declared` says which samples can be compared at all, and gives the residual whose repetitions
   /// tell the noise; `noise_scale` is what its standard deviation grows by beyond what laps tell,
   /// `form` the RMS per channel that the model is known to leave [SI] and that counts as noise,
-  /// too. The references must outlive this.
+  /// too. Commands that are missing are bridged. `replica` must outlive this.
   Evidence(const Record& record, Replica& replica, const Machine& declared,
            std::vector<double> noise_scale = {}, const std::vector<double>& form = {});
 
@@ -168,7 +168,7 @@ class Evidence {
   RoleGrams summed(const std::vector<const Column*>& a, const std::vector<const Column*>& b,
                    const Add& add) const;
 
-  const Record& record_;
+  const Record record_;
   Replica& replica_;
   mutable Gathering gathering_;
   mutable RecentProducts recent_;

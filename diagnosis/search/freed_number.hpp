@@ -1,7 +1,6 @@
 // Numbers of a machine that a fit may move, and moving them.
 #pragma once
 
-#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>

@@ -177,7 +177,7 @@ class Laws {
       case Covariate::time:
         break;
     }
-    return evidence_.record().begin + static_cast<double>(k) * period_;
+    return static_cast<double>(k) * period_;
   }
 
   Series knots(const Law& law) const {
@@ -208,7 +208,7 @@ class Laws {
     Law law;
     law.axis = law.over_axis = law.times_axis = static_cast<Law::OfAxis>(axis);
     law.point = point;
-    const double time = evidence_.record().begin + static_cast<double>(sample) * period_;
+    const double time = static_cast<double>(sample) * period_;
     law.at = {time - std::min(period_, kLongestJump), time};
     return law;
   }
@@ -238,7 +238,7 @@ class Laws {
     std::size_t fastest = 0;
     for (std::size_t k = 0; k < v.size(); ++k)
       if (std::abs(v[k]) > std::abs(v[fastest])) fastest = k;
-    const double time = evidence_.record().begin + static_cast<double>(fastest) * period_;
+    const double time = static_cast<double>(fastest) * period_;
     const double size = is_rotary(i) ? 1 : 50;
     const SeriesOfChannels answer = difference(pulse(i, time, size), period_ / (size * kPulse));
     const auto length = static_cast<std::size_t>(std::round(0.3 / period_));
@@ -458,8 +458,9 @@ std::string words_of(const Law& law) {
   else if (law.times != Covariate::time)
     factor = named(law.times, law.times_axis) + " ";
   if (law.jumps())
-    return fmt::format("{} on {} that jumps at {:.2f} s", points[static_cast<int>(law.point)],
-                       kAxisNames[law.axis_index()], law.at.back());
+    return fmt::format("{} on {} that jumps at {:.2f} s of the run",
+                       points[static_cast<int>(law.point)], kAxisNames[law.axis_index()],
+                       law.at.back());
   return fmt::format("{} on {} as {}f({})", points[static_cast<int>(law.point)],
                      kAxisNames[law.axis_index()], factor, named(law.over, law.over_axis));
 }

@@ -14,7 +14,7 @@
 
 namespace vcnc {
 
-/// At most a second of one stretch.
+/// About a second of one stretch, 1.5 s at most.
 struct RecordBlock {
   std::size_t begin = 0, end = 0;  ///< samples [begin, end)
   std::size_t stretch = 0;         ///< index into the stretches of the partition

@@ -97,9 +97,8 @@ std::optional<PeriodSlip> find_period_slip(const Record& record,
       });
       if (!alone) continue;
       if (found) return std::nullopt;
-      found = PeriodSlip{.periods = n,
-                         .channel = channel[c],
-                         .start = record.begin + static_cast<double>(k) * record.period};
+      found = PeriodSlip{
+          .periods = n, .channel = channel[c], .start = static_cast<double>(k) * record.period};
     }
   }
   return found;

@@ -279,7 +279,6 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
       fresh.x = x;
       fresh.prediction = evidence.predict(with(start, moved(live, x)));
       fresh.residual = evidence.residual(fresh.prediction);
-      ++result.simulations;
       points.push_back(std::move(fresh));
       p = std::prev(points.end());
     }
@@ -287,7 +286,6 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
       const std::vector<FreedNumber> at = moved(live, x);
       const Machine machine = with(start, at);
       p->columns = columns_of(evidence, machine, p->prediction, at);
-      result.simulations += static_cast<int>(live.size());
     }
     return *p;
   };
@@ -348,7 +346,6 @@ Refit refit(const Evidence& evidence, const Machine& start, const std::vector<Fr
   for (const FreedNumber& n : result.live) prior += n.pull() * n.pull();
   result.fitted = step.fitted + prior;
   result.held_out = step.held_out + prior;
-  result.prediction = std::move(best.prediction);
   result.residual = std::move(best.residual);
   result.columns = std::move(best.columns);
   result.linear_step = step.step;

@@ -53,12 +53,10 @@ struct Refit {
   std::vector<FreedNumber> live, linear;  ///< at the solution
   Machine machine;                        ///< with both
   double fitted = 0, held_out = 0;        ///< chi-square with priors
-  Prediction prediction;                  ///< with the live numbers, the linear ones as they were
-  Column residual;                        ///< of that prediction
+  Column residual;                        ///< with the live numbers, the linear ones as they were
   std::vector<Column> columns;            ///< of the live numbers at the solution
   Eigen::VectorXd linear_step;            ///< of the linear numbers, in typical sizes
   std::vector<double> held_out_of;        ///< chi-square per channel, without priors
-  int simulations = 0;
 };
 
 /// How a search begins: as sensitivities tell, or with short steps where shapes are far off.

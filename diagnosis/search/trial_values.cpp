@@ -225,7 +225,7 @@ double TrialValuesOf::find_jump(const Column& residual) const {
       at = static_cast<double>(k) * evidence_->record().period;
     }
   }
-  return at + evidence_->record().begin;
+  return at;
 }
 
 /// Peaks of the periodogram over the median around them; blocks of the fitted laps, Hann's window.

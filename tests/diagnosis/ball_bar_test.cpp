@@ -206,6 +206,8 @@ TEST(BallBar, RefusesWithKeyAndReason) {
       {kSound, "signals.kind: a bar needs how the axes moved"},
       {kSound + arc(0, 0, 360) + "[[laps]]\nfrom_s = 0\nto_s = 2\n",
        "map.toml:19: laps: arcs say already"},
+      {"lap_column = \"time\"\n" + (kSound + arc(0, 0, 360)),
+       "map.toml:1: lap_column: arcs say already"},
       {std::string(kSound) + arc(0, 0, 5), "arcs.sweep_deg: 5 is too short an arc"},
       {std::string(kSound) + arc(0, 0, 360) + arc(2, 0, 360),
        "arcs.from_s: the arc begins before the one above it ends"},

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/records/commanded_motion.hpp"
 #include "model/probe/noise.hpp"
 
 namespace vcnc::comparable_test {
@@ -89,6 +90,15 @@ TEST(Comparable, NotReadingsOfABallThatRestsUntilItsDragHasTurnedOver) {
 TEST(Comparable, ReadingsOfASlowScan) {
   const auto flags = RecordedRamp(ramp(0.5e-3)).comparable();
   EXPECT_EQ(left_out(flags[2]), 80U);  // until 40 um are done
+}
+
+TEST(Comparable, ACommandThatIsMissingTakesNoReadingsAlong) {
+  RecordedRamp run(ramp(0.05));
+  for (const std::size_t missing : {700U, 701U, 1400U})
+    run.record.signals[0].value[missing] = kMissing;
+  run.record = with_bridged_commands(run.record);
+  EXPECT_DOUBLE_EQ(run.record.signals[0].value[700], 0.05 * 0.7);
+  EXPECT_EQ(left_out(run.comparable()[2]), 0U);
 }
 
 TEST(Comparable, NotReadingsAboutTheMomentOfReleaseHoweverLongTheBallSwings) {

@@ -182,6 +182,7 @@ TEST(Diagnose, WhatWasRunOnceIsNotCalledLoud) {
 TEST(Diagnose, NamesALawWhereTheLibraryHasNone) {
   // A displacement by a function of the other axis, which no candidate makes.
   Record record = measured({}, 3);
+  record.begin = 1000;
   const std::vector<double>& y = record.find(SignalKind::command, 1)->value;
   for (MeasuredSignal& s : record.signals)
     if (s.kind == SignalKind::deflection)
@@ -319,6 +320,7 @@ class AtARate : public testing::TestWithParam<double> {};
 TEST_P(AtARate, TellsWhenSomethingSlipped) {
   Record record = toy::commands(1000, 4);
   record.period = GetParam();
+  record.begin = 1000;  // by the clock of the table; that of a model begins with the record
   toy::measure(record, {}, 47);
   const std::size_t at = record.samples() / 2 + 77;
   for (MeasuredSignal& s : record.signals)
@@ -481,7 +483,9 @@ TEST(Diagnose, FindsASlipOfTheCounterBesideAnEffect) {
   Machine truth;
   truth.effects.get<PeriodSlip>() = {.periods = -2, .channel = 0, .start = 5.3};
   move_number(truth, "effects.X.load_play.width_um", 2);
-  const Diagnosis d = diagnosed(measured(truth, 33));
+  Record record = measured(truth, 33);
+  record.begin = 1000;
+  const Diagnosis d = diagnosed(record);
   EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
   ASSERT_EQ(d.effects.size(), 2U);
   EXPECT_EQ(d.effects[0].name, "period_slip");

@@ -41,7 +41,7 @@ Diagnosis found_backlash() {
                    "rotary",
                    "effects.C.cogging.amplitude_Nm",
                    {}}};
-  d.ladder = {{"", 5000, {3e-6}}, {"X.backlash", 1200, {1e-6}}};
+  d.ladder = {{"declared", 5000, {3e-6}}, {"X.backlash", 1200, {1e-6}}};
   d.warnings = {"25 samples are missing"};
   return d;
 }
@@ -81,6 +81,9 @@ TEST(DiagnosisText, BeginsWithTheVerdictAndHasNumbersWithIntervals) {
   EXPECT_EQ(verdict_sentence(d),
             "what was added explains 99.3 % of what was to be explained and leaves 1.66 times the "
             "noise");
+  for (const auto& [share, words] :
+       {std::pair(0.37, "37 %"), {0.012, "1 %"}, {0.0043, "0.4 %"}, {1.0, "100 %"}})
+    EXPECT_EQ(percent(share), words);
   const std::string text = to_text(found_backlash());
   EXPECT_EQ(text.find("PARTLY: what was added explains 87 %"), 0u) << text;
   for (const char* part :

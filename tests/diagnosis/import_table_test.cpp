@@ -277,6 +277,64 @@ TEST(ImportTable, LapsByTimeAndByColumn) {
   EXPECT_EQ(by_column.stretches[2].repetition, 2);
 }
 
+TEST(ImportTable, RefusesLapsOfOneConditionThatAreDifferentMotions) {
+  // Half a period later the axis swings the other way.
+  const std::string reason = refusal(sound_map() +
+                                     "[[laps]]\nfrom_s = 0\nto_s = 2\ncondition = \"swing\"\n"
+                                     "[[laps]]\nfrom_s = 3\nto_s = 5\ncondition = \"swing\"\n");
+  EXPECT_NE(reason.find("laps.condition: the laps \"swing\" at 0.000 and 3.000 s are different "
+                        "motions; laps of one condition repeat the same one"),
+            std::string::npos)
+      << reason;
+  EXPECT_EQ(reason.find("map.toml:"), 0u) << reason;
+}
+
+TEST(ImportTable, RefusesLapsThatReachBeyondTheRun) {
+  const std::string reason = refusal(sound_map() + "[[laps]]\nfrom_s = 4\nto_s = 6.1\n");
+  EXPECT_NE(reason.find("laps.to_s: the lap lies partly outside the run, 0.000 .. 5.999 s"),
+            std::string::npos)
+      << reason;
+  EXPECT_NE(refusal(sound_map() + "[[laps]]\nfrom_s = 8\nto_s = 9\n")
+                .find("laps.from_s: the lap lies outside the run"),
+            std::string::npos);
+  EXPECT_EQ(imported(sound_map() + "[[laps]]\nfrom_s = 4\nto_s = 6\n").stretches.size(), 1u);
+}
+
+/// A column "lap" that counts from `begin` [s] on, `length` [s] each, and holds nothing later.
+MeasuredTable with_laps(const std::vector<std::pair<double, double>>& laps) {
+  MeasuredTable table = table_of(columns());
+  MeasuredColumn column{.name = "lap", .value = std::vector<double>(kRows, NAN)};
+  for (std::size_t n = 0; n < laps.size(); ++n)
+    for (std::size_t k = 0; k < kRows; ++k)
+      if (const double t = static_cast<double>(k) * kStep;
+          t >= laps[n].first - 1e-9 && t < laps[n].first + laps[n].second - 1e-9)
+        column.value[k] = static_cast<double>(n);
+  table.columns.push_back(column);
+  return table;
+}
+
+TEST(ImportTable, ALapThatWasBrokenOffAndOneThatNobodyToldOfAreMotionsOfTheirOwn) {
+  const Record broken =
+      imported("lap_column = \"lap\"\n" + sound_map(), with_laps({{0, 2}, {2, 2}, {4, 1}}));
+  ASSERT_EQ(broken.stretches.size(), 3u);
+  EXPECT_EQ(broken.stretches[1].condition, broken.stretches[0].condition);
+  EXPECT_NE(broken.stretches[2].condition, broken.stretches[0].condition);
+  EXPECT_EQ(broken.stretches[2].repetition, 0);
+  EXPECT_TRUE(warned(broken,
+                     "at 0.000 and 4.000 s take 2.000 and 1.000 s: they count as motions of "
+                     "their own"))
+      << all_warnings(broken);
+  const Record other =
+      imported("lap_column = \"lap\"\n" + sound_map(), with_laps({{0, 1}, {1, 1}, {2, 1}, {3, 1}}));
+  ASSERT_EQ(other.stretches.size(), 4u);
+  EXPECT_EQ(other.stretches[2].condition, other.stretches[0].condition);
+  EXPECT_EQ(other.stretches[2].repetition, 1);
+  EXPECT_NE(other.stretches[1].condition, other.stretches[0].condition);
+  EXPECT_EQ(other.stretches[3].condition, other.stretches[1].condition);
+  EXPECT_TRUE(warned(other, "at 0.000 and 1.000 s are different motions: they count"))
+      << all_warnings(other);
+}
+
 TEST(ImportTable, RefusesLapsTooShortToTellTheirNoise) {
   const std::string by_time =
       refusal(sound_map() + "[[laps]]\nfrom_s = 0\nto_s = 0.02\n[[laps]]\nfrom_s = 1\nto_s = 2\n");
@@ -717,6 +775,19 @@ class RecordFile : public testing::Test {
  protected:
   const Scratch folder_;
 };
+
+TEST_F(RecordFile, ADamagedOneIsStillARecordAndIsToldAsSuch) {
+  const std::string file = folder_ / "run.h5";
+  write_record(imported(sound_map()), file);
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) - 100);
+  EXPECT_TRUE(is_record_file(file));
+  try {
+    load_record(file);
+    FAIL() << "accepted";
+  } catch (const MeasurementError& e) {
+    EXPECT_NE(std::string(e.what()).find("import it again"), std::string::npos) << e.what();
+  }
+}
 
 TEST_F(RecordFile, ReadsBackWhatWasWrittenToTheLastBit) {
   Record record = imported(sound_map());

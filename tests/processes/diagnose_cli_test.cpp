@@ -2,7 +2,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
 
 #include "tests/processes/shell.hpp"
@@ -267,14 +269,70 @@ TEST_F(DiagnoseCli, WhatWasImportedWithoutAMachineIsCheckedWithTheModel) {
   const Said imported = vcnc("import " + (scratch_ / "far.csv") + " --map " +
                              (scratch_ / "far.toml") + " --out " + record);
   ASSERT_EQ(imported.code, 0) << imported.err;
-  EXPECT_NE(imported.out.find("The map names no machine: travels, speeds, forces and inertias are "
-                              "not checked until vcnc diagnose has the model."),
-            std::string::npos)
+  EXPECT_NE(
+      imported.out.find("The map names no machine: travels, speeds, forces, inertias and readings "
+                        "are not checked until vcnc diagnose has the model."),
+      std::string::npos)
       << imported.out;
   const std::string model = scratch_ / "machine.toml", travel = "the declared travel is";
   expect_refused("diagnose " + record + " --model " + model, travel);
   expect_refused("commission " + record + " --model " + model + " --out " + (scratch_ / "new.toml"),
                  travel);
+}
+
+/// Two laps of a circle as a grid encoder sees it.
+class GridEncoderCli : public DiagnoseCli {
+ protected:
+  GridEncoderCli() {
+    write_text(scratch_ / "small.csv", circles(20));
+    write_text(scratch_ / "large.csv", circles(30));
+    for (const char* zero : {"90", "80"})
+      write_text(scratch_ / ("zero" + std::string(zero) + ".toml"), map(zero));
+  }
+  static std::string circles(double radius_mm) {
+    std::string text = "t,X,Y,Z,x,y\n";
+    for (int k = 0; k < 5200; ++k) {
+      const double turned = kPi2 * std::clamp(k - 100, 0, 5000) / 2500;
+      const double x = 90 + radius_mm * std::cos(turned), y = 90 + radius_mm * std::sin(turned);
+      const double noise = 1e-4 * std::sin(12.9898 * k * k);
+      text += fmt::format("{},{:.6f},{:.6f},260,{:.4f},{:.4f}\n", k, x, y, 1e3 * (x - 90 + noise),
+                          1e3 * (y - 90 - noise));
+    }
+    return text;
+  }
+  static std::string map(const std::string& zero_of_x) {
+    std::string text = "machine = \"machine.toml\"\n[time]\ncolumn = \"t\"\nunit = \"ms\"\n";
+    for (const char* axis : {"X", "Y", "Z"})
+      text += fmt::format(
+          "[[signals]]\ncolumn = \"{0}\"\nkind = \"command\"\naxis = \"{0}\"\nunit = \"mm\"\n",
+          axis);
+    for (const char* axis : {"x", "y"})
+      text += fmt::format(
+          "[[signals]]\ncolumn = \"{0}\"\nkind = \"tool_position\"\naxis = \"{0}\"\nunit = "
+          "\"um\"\n",
+          axis);
+    return text + "[tool_position]\nzero_mm = [" + zero_of_x + ", 90, 260]\n";
+  }
+};
+
+TEST_F(GridEncoderCli, AnImportRefusesReadingsThatTheMachineOfItsMapCannotMake) {
+  const std::string table = "import " + (scratch_ / "small.csv") + " --map ";
+  const std::string record = scratch_ / "run.h5";
+  expect_refused(table + (scratch_ / "zero80.toml") + " --out " + record,
+                 "\"x\" (tool position x) is -10 mm off what the machine of the model would read");
+  EXPECT_FALSE(std::filesystem::exists(record));
+  const Said said = vcnc(table + (scratch_ / "zero90.toml") + " --out " + record);
+  EXPECT_EQ(said.code, 0) << said.err;
+  EXPECT_TRUE(std::filesystem::exists(record));
+}
+
+TEST_F(GridEncoderCli, AReferenceThatCannotBeComparedIsRefusedBeforeAnythingIsSought) {
+  const std::string out = scratch_ / "why";
+  expect_refused("diagnose " + (scratch_ / "small.csv") + " --reference " +
+                     (scratch_ / "large.csv") + " --map " + (scratch_ / "zero90.toml") + " --out " +
+                     out,
+                 "large.csv: does none of the motions of");
+  EXPECT_FALSE(std::filesystem::exists(out));
 }
 
 TEST_F(DiagnoseCli, TheMapHasItsReference) {
