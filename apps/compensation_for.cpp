@@ -288,10 +288,15 @@ Verdict friction(Work& w, std::size_t axis) {
   if (const double stiffness = w.effects(axis).get<Presliding>().stiffness; stiffness > 0)
     return no(fmt::format("it turns over a way of {}; a pulse at the reversal would come too early",
                           length(2 * dry / stiffness, is_rotary(axis))));
+  if (declared.servo.controller != ServoParams::Controller::cascade)
+    return no("the pulse is for a drive whose velocity loop integrates");
+  const double crossover = is.servo.velocity_gain > 0 ? is.servo.velocity_gain / inertia
+                                                      : 2 * kPi * is.servo.velocity_bandwidth;
   ReversalPulse& pulse = w.settings.axes[axis].friction;
-  pulse = pulse_against(2 * dry, inertia, 2 * kPi * is.servo.velocity_bandwidth,
-                        is.servo.integral_time, is.servo.kv_per_s);
-  const double bearable = declared.limits.acceleration * std::max(pulse.rise, kCycle);
+  pulse = pulse_against(2 * dry, inertia, crossover, is.servo.integral_time, is.servo.kv_per_s);
+  constexpr double kRounding = 1e-9;
+  const double bearable =
+      (1 - kRounding) * declared.limits.acceleration * std::max(pulse.rise, kCycle);
   const bool limited = pulse.amplitude > bearable;
   pulse.amplitude = std::min(pulse.amplitude, bearable);
   std::string text =

@@ -184,13 +184,6 @@ bool is_unrecorded_axis(const std::string& place, const Record& record) {
   return std::find(kAxisNames.begin(), kAxisNames.end(), place) != kAxisNames.end();
 }
 
-/// "Y" of "effects.Y.coulomb.level_N"; a place, where it is no key.
-std::string place_of_key(const std::string& key) {
-  const std::size_t from = key.find('.') + 1;
-  if (from == 0) return key;
-  return key.substr(from, key.find('.', from) - from);
-}
-
 /// Of an axis that is not recorded nothing can be held against the record.
 void check_recorded(const std::vector<std::string>& suspects, const std::vector<Candidate>& all,
                     const std::vector<std::string>& numbers, const Record& record) {

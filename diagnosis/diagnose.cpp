@@ -180,7 +180,11 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
     const Machine found = search->selection.found.machine;
     of.replica.anchor(declared);
     auto next = std::make_unique<Attempt>(question, before, now, keep_going, &found);
-    if (next->selection.interrupted) return false;
+    if (next->selection.interrupted) {  // what was found before stands, and is no verdict
+      search->selection.interrupted = true;
+      of.replica.anchor(found);
+      return false;
+    }
     std::swap(search, next);
     return true;
   };

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <tuple>
 #include <utility>
 
 #include "diagnosis/replica/model_comparison.hpp"
@@ -64,12 +63,6 @@ std::string program_for(const std::string& effect) {
 }
 
 /// "effects.X.scale_error.error_ppm": ("X", "scale_error").
-std::pair<std::string, std::string> place_and_effect(const std::string& key) {
-  const std::size_t place = key.find('.') + 1, effect = key.find('.', place) + 1;
-  return {key.substr(place, effect - place - 1),
-          key.substr(effect, key.find('.', effect) - effect)};
-}
-
 bool of_measurement(const std::string& effect) {
   const EffectText* text = text_of(effect);
   return text && (text->family == Family::probe || text->family == Family::acquisition ||
@@ -228,8 +221,7 @@ class Report {
       const auto released = std::find_if(found().released.begin(), found().released.end(),
                                          [&](const ReleasedNumber& r) { return r.key == key; });
       if (released == found().released.end()) {
-        if (!n.common() && !key.starts_with("effects.setup.") &&
-            std::abs(n.pull()) > options_.out_of_tolerance)
+        if (!n.common() && !is_clamping(key) && std::abs(n.pull()) > options_.out_of_tolerance)
           pulled_.push_back(fmt::format(
               "{} fits best at {:.4g}, {:.1f} tolerances from what is declared ({:.4g}), but that "
               "explains too little to count.",
@@ -239,7 +231,7 @@ class Report {
       FoundEffect e;
       e.name = "deviation";
       e.place = key;
-      if (never_quite_absent(key)) std::tie(e.place, e.name) = place_and_effect(key);
+      if (never_quite_absent(key)) e.place = place_of_key(key), e.name = effect_of_key(key);
       e.numbers.push_back(fitted(n));
       Machine without = found().machine;
       move_number(without, key, n.centre);
@@ -448,10 +440,10 @@ class Report {
     std::map<std::string, FoundEffect> by_effect;
     for (const FreedNumber& n : found().nuisances.numbers) {
       const std::string& key = n.number.key;
-      if (!key.starts_with("effects.setup.")) continue;
+      if (!is_clamping(key)) continue;
       const auto i = intervals.find(key);
       if (i == intervals.end()) continue;
-      const std::string name = key.substr(14, key.find('.', 14) - 14);
+      const std::string name = effect_of_key(key);
       const double worth = options_.clamped_um * (name == "piece_tilt" ? 10 : 1);
       FoundEffect& e = by_effect[name];
       e.numbers.push_back(
@@ -588,7 +580,7 @@ class Report {
     // Where the piece lies is no fault that a model of it could be wrong about.
     Machine clamped = of_.declared;
     for (const FreedNumber& n : this->found().nuisances.numbers)
-      if (n.number.key.starts_with("effects.setup."))
+      if (is_clamping(n.number.key))
         move_number(clamped, n.number.key, number_of(d_.found, n.number.key));
     const std::vector<double> before = evidence_.rms_within_laps(evidence_.predict(clamped),
                                                                  Role::held_out),
@@ -680,6 +672,15 @@ class Report {
     return limits;
   }
 
+  /// Of a candidate the number that its limits are of.
+  const FreeNumber& limited_number(std::size_t candidate) const {
+    const auto& all = selection_.trials;
+    const auto at = std::find_if(all.begin(), all.end(), [&](const TrialColumns& t) {
+      return t.trial.candidate == candidate;
+    });
+    return of_.candidates[candidate].numbers[at->trial.directions.front().number];
+  }
+
   void tell_excitation() {
     const auto& beside = selection_.beside_found;
     std::vector<double> alone;
@@ -696,16 +697,12 @@ class Report {
     if (finest < 1) d_.excitation.push_back({"probe.period_slip", finest, true, "", "", {}});
     for (const auto& [c, limit] : limits) {
       const Candidate& candidate = of_.candidates[c];
-      double typical = 0;
+      const FreeNumber& number = limited_number(c);
+      double typical = std::abs(number.typical);
       for (std::size_t i = 0; i < candidate.numbers.size() && typical == 0; ++i)
         typical = std::abs(candidate.numbers[i].typical);
-      const bool limited = is_limit(candidate.numbers.front());
-      Excitation e{candidate.name(),
-                   limit,
-                   limited ? std::isfinite(limit) : limit < typical,
-                   "",
-                   candidate.numbers.front().key,
-                   {}};
+      const bool excited = is_limit(number) ? std::isfinite(limit) : limit < typical;
+      Excitation e{candidate.name(), limit, excited, "", number.key, {}};
       if (!e.excited) e.program = program_for(candidate.effect);
       if (const auto found = limits_beside.find(c); found != limits_beside.end())
         e.beside_found = found->second;
@@ -713,8 +710,8 @@ class Report {
     }
     for (std::size_t i = 0; i < selection_.release_limits.size(); ++i) {
       const FreeNumber& n = selection_.base.nuisances.numbers[i].number;
-      if (n.key.starts_with("effects.setup.")) continue;
-      const auto [place, effect] = place_and_effect(n.key);
+      if (is_clamping(n.key)) continue;
+      const std::string place = place_of_key(n.key), effect = effect_of_key(n.key);
       const double limit = selection_.release_limits[i];
       Excitation e{never_quite_absent(n.key) ? place + "." + effect : n.key,
                    limit,

@@ -5,20 +5,43 @@
 #include "analysis/hdf5_columns.hpp"
 #include "analysis/recording.hpp"
 #include "configs/config.hpp"
+#include "diagnosis/records/commanded_motion.hpp"
 #include "diagnosis/records/import_table.hpp"
 #include "diagnosis/records/record_check.hpp"
 #include "diagnosis/records/record_file.hpp"
 #include "diagnosis/records/record_from_recording.hpp"
+#include "model/axes.hpp"
 #include "model/fingerprint.hpp"
 
 namespace vcnc {
 
 namespace {
 
+/// Of two encoders that of the loop became the position when the table was imported.
+void check_loops(const Record& record, const Machine& machine) {
+  if (record.machine_toml.empty()) return;
+  const Machine imported = parse_machine(record.machine_toml, record.source);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    if (imported.axes[axis].servo.feedback == machine.axes[axis].servo.feedback ||
+        !record.find(SignalKind::position, axis) || !record.find(SignalKind::twist, axis) ||
+        is_followed(record, axis))
+      continue;
+    throw MeasurementError(
+        record.source + ": was imported for a machine whose loop of " +
+        std::string(kAxisNames[axis]) +
+        " is closed with the other side of its transmission (axes." +
+        std::string(kAxisNames[axis]) +
+        ".feedback) than that of this model; import it again with a map that names this one");
+  }
+}
+
 /// An import may have known no machine, or another one.
 Record checked_record(const std::string& path, const std::string& model) {
   Record record = read_record(path);
-  if (!model.empty()) check_against(record, load_machine(model));
+  if (model.empty()) return record;
+  const Machine machine = load_machine(model);
+  check_loops(record, machine);
+  check_against(record, machine);
   return record;
 }
 

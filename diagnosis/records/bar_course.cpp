@@ -75,7 +75,7 @@ BarCourse bar_course(const std::vector<BarArc>& arcs, double speed, const std::v
     const auto sample = static_cast<std::size_t>(std::ceil((soonest + offset) / period - 1e-6));
     const double begins = static_cast<double>(sample) * period - offset;
     if (first) course.begin = arc.from - begins;
-    course.later = begins - (arc.from - course.begin);
+    course.later = std::max(course.later, begins - (arc.from - course.begin));
     const double ends = begins + motion.duration();
     while (now() < ends + ArcMotion::tail())
       course.angle.push_back(now() < begins - ArcMotion::lead() ? at

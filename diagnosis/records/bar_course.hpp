@@ -27,7 +27,7 @@ struct BarCourse {
   std::vector<double> angle;        ///< of every sample [rad]
   std::vector<std::size_t> sample;  ///< of each row of the table; none: it lies in no arc
   double begin = 0;                 ///< of the first sample, in the time of the first arc [s]
-  double later = 0;                 ///< that the last arc comes than the table says [s]
+  double later = 0;                 ///< that an arc comes than the table says, at most [s]
 
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 };

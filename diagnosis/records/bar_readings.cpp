@@ -29,12 +29,12 @@ class BarImport {
     std::vector<double> time;
     for (const std::size_t index : base_.index)
       time.push_back(base_.begin + static_cast<double>(index) * base_.period);
-    check_length();
+    check_bar_length(columns_, signal_, column_);
     check_arcs(time);
     const BarCourse course = bar_course(arcs, bar.feed / bar.radius, time, base_.period);
     if (course.later > base_.period)
       record_.warnings.push_back(
-          fmt::format("the last arc comes {:.3g} s later than the table says: an axis must stop, "
+          fmt::format("an arc comes {:.3g} s later than the table says: an axis must stop, "
                       "turn round and be at its feed between two arcs",
                       course.later));
     record_.begin = course.begin;
@@ -63,28 +63,6 @@ class BarImport {
   }
 
  private:
-  /// A bar that reads more than its range is of another unit, or tells its whole length.
-  void check_length() const {
-    double sum = 0, most = 0;
-    std::size_t there = 0, at = 0;
-    for (std::size_t i = 0; i < base_.index.size(); ++i) {
-      const double v = to_si(signal_, column_.value[i]);
-      if (!std::isfinite(v)) continue;
-      sum += v, ++there;
-      if (std::abs(v) > most) most = std::abs(v), at = i;
-    }
-    if (there == 0)
-      throw MeasurementError(
-          fmt::format("{}: \"{}\" has no value at all", columns_.table().source, column_.name));
-    if (most <= kBarRange) return;
-    const bool whole = std::abs(sum / static_cast<double>(there) - map_.bar.radius) < kBarRange;
-    throw MeasurementError(fmt::format(
-        "{}: \"{}\" (bar) is {:.4g} mm, and no ball bar moves by more than {:.0f} mm; {}",
-        columns_.table().place(at), column_.name, 1e3 * most, 1e3 * kBarRange,
-        whole ? "this is its whole length: take its radius off by offset"
-              : "check its unit and scale"));
-  }
-
   /// Readings of an arc and around it, up to the next break.
   struct Block {
     double first = 0, last = 0;      ///< reading of the arc [s]
@@ -166,6 +144,29 @@ class BarImport {
 };
 
 }  // namespace
+
+void check_bar_length(const MapColumns& columns, const ImportMap::Signal& signal,
+                      const MeasuredColumn& column) {
+  double sum = 0, most = 0;
+  std::size_t there = 0, at = 0;
+  for (std::size_t i = 0; i < column.value.size(); ++i) {
+    const double v = to_si(signal, column.value[i]);
+    if (!std::isfinite(v)) continue;
+    sum += v, ++there;
+    if (std::abs(v) > most) most = std::abs(v), at = i;
+  }
+  if (there == 0)
+    throw MeasurementError(
+        fmt::format("{}: \"{}\" has no value at all", columns.table().source, column.name));
+  if (most <= kBarRange) return;
+  const bool whole =
+      std::abs(sum / static_cast<double>(there) - columns.map().bar.radius) < kBarRange;
+  throw MeasurementError(
+      fmt::format("{}: \"{}\" (bar) is {:.4g} mm, and no ball bar moves by more than {:.0f} mm; {}",
+                  columns.table().place(at), column.name, 1e3 * most, 1e3 * kBarRange,
+                  whole ? "this is its whole length: take its radius off by offset"
+                        : "check its unit and scale"));
+}
 
 void add_bar_on_arcs(const MapColumns& columns, const MeasuredColumn& column, const TimeBase& base,
                      Record& record) {

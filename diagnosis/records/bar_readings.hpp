@@ -11,6 +11,11 @@
 
 namespace vcnc {
 
+/// Throws MeasurementError where a bar reads more than its range: its unit is another one, or it
+/// tells its whole length.
+void check_bar_length(const MapColumns& columns, const ImportMap::Signal& signal,
+                      const MeasuredColumn& column);
+
 /// Adds the commands of the arcs and the readings, on the time base of these (bar_course.hpp), and
 /// warnings. `column` is that of the map's only signal. Throws ConfigError, MeasurementError.
 void add_bar_on_arcs(const MapColumns& columns, const MeasuredColumn& column, const TimeBase& base,

@@ -85,6 +85,7 @@ std::vector<double> smooth_path(const std::vector<double>& measured, double h) {
   return pass(measured, static_cast<std::size_t>(std::max(2.0, half)));
 }
 
+/// A drive is told multiples of the step of its bus.
 void round_to(std::vector<double>& value, double step) {
   if (step > 0)
     for (double& v : value) v = std::round(v / step) * step;

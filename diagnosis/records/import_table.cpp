@@ -165,6 +165,7 @@ class Importer {
         signal.kind = SignalKind::deflection;
         break;
       case Kind::bar:
+        check_bar_length(by_map_, s, column);
         signal.kind = SignalKind::bar;
         break;
       case Kind::tool_position:

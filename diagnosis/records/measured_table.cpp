@@ -130,7 +130,7 @@ class TextTable {
     last_line_ = line_;
     if (!begun_)
       begin();
-    else if (!heading_rows_over_ && is_heading())
+    else if (!heading_rows_over_ && is_units())
       table_.notes.push_back(
           fmt::format("line {} holds no numbers and was taken for units, which "
                       "come from the map",
@@ -245,6 +245,26 @@ class TextTable {
     return text;
   }
 
+  /// The unit of a number that has none is 1.
+  bool is_units() const {
+    const auto is_text = [&](const std::string& f) {
+      return !missing(f) && !number_of(f) && !has_decimal_comma(f);
+    };
+    const auto may_be = [&](const std::string& f) { return f == "1" || !number_of(f); };
+    return std::any_of(fields_.begin(), fields_.end(), is_text) &&
+           std::all_of(fields_.begin(), fields_.end(), may_be);
+  }
+
+  /// Whether the remark above the first row may name columns; then these are its fields.
+  bool remark_splits() {
+    try {
+      split(remark_);
+    } catch (const MeasurementError&) {  // quotes of its own
+      return false;
+    }
+    return !remark_.empty();
+  }
+
   void begin() {
     begun_ = true;
     const bool heading = is_heading();
@@ -252,8 +272,7 @@ class TextTable {
     if (!heading) {
       const std::size_t columns = fields_.size();
       const std::vector<std::string> values = std::move(fields_);
-      if (!remark_.empty()) split(remark_);
-      if (remark_.empty() || fields_.size() != columns || !is_heading()) {
+      if (!remark_splits() || fields_.size() != columns || !is_heading()) {
         fields_.clear();
         for (std::size_t i = 0; i < columns; ++i) fields_.push_back(std::to_string(i + 1));
       }

@@ -19,6 +19,14 @@ namespace vcnc {
 
 namespace {
 
+/// A ramp has a step from sample to sample, too, and begins anywhere.
+bool are_multiples(const std::vector<double>& value, double step) {
+  constexpr double kOff = 0.05;
+  return std::all_of(value.begin(), value.end(), [&](double v) {
+    return !std::isfinite(v) || std::abs(v / step - std::round(v / step)) < kOff;
+  });
+}
+
 using Series = std::vector<double>;
 
 constexpr double kSmoothing = 10e-3;        ///< [s] of all derivatives here
@@ -187,7 +195,7 @@ class Checker {
     const double off = x[first] - 0.5 * (x[first - 1] + x[first + 1]);
     warn(
         fmt::format("{}: {} alone far off the values before and after, the first by {:.4g} (SI) "
-                    "at {:.6g} s; if {} not measured, say so by missing = [...] in the map",
+                    "at {:.4f} s; if {} not measured, say so by missing = [...] in the map",
                     name(s), count == 1 ? "1 value stands" : fmt::format("{} values stand", count),
                     off, record_.time_of(first), count == 1 ? "it was" : "they were"));
   }
@@ -231,6 +239,7 @@ class Checker {
       if (const MeasuredSignal* p = record_.find(SignalKind::position, s.axis);
           s.kind == SignalKind::twist && p && s.resolution < 1e-12 * spread_of(p->value).span())
         s.resolution = 0;
+      if (s.kind == SignalKind::command && !are_multiples(s.value, s.resolution)) s.resolution = 0;
       const double steps = s.resolution > 0 ? spread_of(s.value).span() / s.resolution : HUGE_VAL;
       if (steps < kFewestSteps && s.kind != SignalKind::temperature && !told)
         warn(fmt::format("{} comes in {:.0f} coarse steps of {:.3g} (SI)", name(s), steps,

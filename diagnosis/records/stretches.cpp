@@ -261,13 +261,18 @@ class Segmentation {
   std::vector<Stretch> stretches_;
 };
 
+/// 0 where there is nothing.
+double mean_of(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) /
+         static_cast<double>(std::max<std::size_t>(values.size(), 1));
+}
+
 /// Standard deviation; 0 where there is nothing.
 double deviation(const std::vector<double>& values) {
-  const auto n = static_cast<double>(std::max<std::size_t>(values.size(), 1));
-  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
+  const double mean = mean_of(values);
   double sum = 0;
   for (const double v : values) sum += (v - mean) * (v - mean);
-  return std::sqrt(sum / n);
+  return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(values.size(), 1)));
 }
 
 /// Where an axis was told to be, else where it was; null: neither is known.
@@ -278,7 +283,8 @@ const MeasuredSignal* way_of(const Record& record, std::size_t axis) {
 
 }  // namespace
 
-bool same_way(const Record& a, const Stretch& of_a, const Record& b, const Stretch& of_b) {
+bool same_way(const Record& a, const Stretch& of_a, const Record& b, const Stretch& of_b,
+              At place) {
   const std::size_t n = std::min(of_a.end - of_a.begin, of_b.end - of_b.begin);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const MeasuredSignal *way_a = way_of(a, axis), *way_b = way_of(b, axis);
@@ -289,6 +295,7 @@ bool same_way(const Record& a, const Stretch& of_a, const Record& b, const Stret
       if (std::isfinite(p) && std::isfinite(q)) x.push_back(p), apart.push_back(q - p);
     }
     if (deviation(apart) > kOtherWay * deviation(x) + kNoWay) return false;
+    if (place == At::the_same_place && std::abs(mean_of(apart)) > kNoWay) return false;
   }
   return true;
 }

@@ -26,8 +26,11 @@ std::vector<char> moving(const Record& record, std::size_t axis);
 /// In order of time, not overlapping; empty where no command is known.
 std::vector<Stretch> stretches_of(const Record& record);
 
-/// Whether all axes go the same way in both, from wherever they begin, as far as the shorter one
-/// lasts: where they were told to be, else where they were.
-bool same_way(const Record& a, const Stretch& of_a, const Record& b, const Stretch& of_b);
+enum class At { any_place, the_same_place };
+
+/// Whether all axes go the same way in both, as far as the shorter one lasts: where they were told
+/// to be, else where they were. At the same place: within a millimetre or a milliradian.
+bool same_way(const Record& a, const Stretch& of_a, const Record& b, const Stretch& of_b,
+              At place = At::any_place);
 
 }  // namespace vcnc

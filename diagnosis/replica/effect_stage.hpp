@@ -57,6 +57,16 @@ constexpr bool is_of_loops() {
          std::is_same_v<typename Effect::Port, SetpointPort>;
 }
 
+/// What a probe makes of its touching and of its signals, and no other device that reads.
+template <class Effect>
+constexpr bool is_of_touch() {
+  using Port = typename Effect::Port;
+  return (std::is_same_v<Port, TouchPort> && !std::is_same_v<Effect, TipRadius>) ||
+         std::is_same_v<Port, AnaloguePort> ||
+         (std::is_same_v<Port, DeflectionPort> && !std::is_same_v<Effect, SampleLatency> &&
+          !std::is_same_v<Effect, SampleJitter> && !std::is_same_v<Effect, ClockDrift>);
+}
+
 /// Calls f(effect, axis) for every effect of a machine; axis kAxisCount for those of no axis.
 template <class SomeEffects, class F>
 void for_each_effect_of(SomeEffects& effects, F&& f) {

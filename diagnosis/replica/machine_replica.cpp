@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <list>
 #include <map>
 #include <mutex>
@@ -11,6 +12,7 @@
 #include "diagnosis/replica/effect_stage.hpp"
 #include "diagnosis/search/candidate.hpp"
 #include "diagnosis/search/parallel.hpp"
+#include "model/parameters.hpp"
 
 namespace vcnc {
 
@@ -211,9 +213,10 @@ void MachineReplica::hold_against(const OnTable& it) {
   }
   const Kinematics kinematics(declared_.kinematics, declared_.probe.length,
                               declared_.setup.work_offset[0]);
-  against_.on_table = {kinematics.forward(q).p_WT, it.bar_length};
+  const Eigen::Matrix3d R_WS = kinematics.jacobian(q).leftCols<3>();  // X, Y, Z in the table
+  against_.on_table = {kinematics.forward(q).p_WT, it.bar_length, R_WS.transpose()};
   if (it.is_bar() && still.size() == 1)
-    across_ = kinematics.jacobian(q).col(static_cast<Eigen::Index>(still.front())).normalized();
+    across_ = R_WS.col(static_cast<Eigen::Index>(still.front())).normalized();
 }
 
 bool MachineReplica::knows_forces() const {
@@ -252,6 +255,19 @@ void MachineReplica::apply(const PerAxis<std::vector<double>>& unknown) {
   anchor(declared_);
 }
 
+/// A follower has loops of its own.
+void MachineReplica::forget_loops_of_followed(Machine& machine) const {
+  std::erase_if(machine.effects.deviations, [&](const Deviation& d) {
+    const auto number = find_parameter(machine, d.key);
+    for (std::size_t axis = 0; number && axis < kAxisCount; ++axis) {
+      const auto* servo = reinterpret_cast<const std::byte*>(&machine.axes[axis].servo);
+      const auto* at = reinterpret_cast<const std::byte*>(number->value);
+      if (motion_.followed[axis] && at >= servo && at < servo + sizeof(ServoParams)) return true;
+    }
+    return false;
+  });
+}
+
 MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine,
                                                          Encoders encoders) const {
   Hypothesis h;
@@ -262,7 +278,10 @@ MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine,
     // What sets loops and set-points says nothing of a drive that is followed.
     const bool unseen = is_of_loops<Effect>() && axis < kAxisCount && motion_.followed[axis];
     if ((is_chance<Effect>() && !stays) || unseen) effect = Effect();
+    if constexpr (is_of_touch<Effect>())  // it is declared of another device
+      if (against_.on_table && !declared_.effects.get<Effect>().null()) effect = Effect();
   });
+  forget_loops_of_followed(h.machine);
   if (!across_.isZero()) {
     Vec3& shift = h.machine.effects.get<PieceOffset>().shift;
     shift -= across_ * across_.dot(shift);

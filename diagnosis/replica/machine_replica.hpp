@@ -90,6 +90,7 @@ class MachineReplica : public Replica {
   void sample_as_recorded(AxisReplay& replay) const;
   Prediction predict(const Hypothesis& hypothesis, const AxisReplays& axes) const;
   void hold_against(const OnTable& it);
+  void forget_loops_of_followed(Machine& machine) const;
   bool knows_forces() const;  ///< of some axis, by apply()
   Prediction assembled(const AxisReplays& axes, const Deflections& reading) const;
   Deflections off_record(const Deflections& reading) const;

@@ -142,7 +142,7 @@ Deflections table_readings(const Machine& actual, const Counterpart::OnTable& of
   Deflections reading;
   for (std::vector<double>& r : reading) r.assign(poses.size(), 0.0);
   for (std::size_t k = 0; k < poses.size(); ++k) {
-    const Vec3 p = poses[k].p_WT - of.p_W0;
+    const Vec3 p = of.R_SW * (poses[k].p_WT - of.p_W0);
     if (!(of.bar_length > 0)) {
       for (std::size_t c = 0; c < 3; ++c) reading[c][k] = p[static_cast<Eigen::Index>(c)];
       continue;

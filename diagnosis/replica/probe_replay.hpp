@@ -52,6 +52,7 @@ struct Counterpart {
   struct OnTable {
     Vec3 p_W0 = Vec3::Zero();  ///< the ball of a bar, or where a sensor reads zero [m]
     double bar_length = 0;     ///< nominal [m]; 0: a sensor
+    Eigen::Matrix3d R_SW = Eigen::Matrix3d::Identity();  ///< into the frame that a sensor tells
   };
   const Piece* piece = nullptr;  ///< null: nothing is touched
   std::optional<OnTable> on_table;

@@ -23,10 +23,11 @@ constexpr double kBesideJump_s = 2;  // shown on both sides of a law that jumps
 /// In the unit shown: less is nothing, and its numbers would have no room.
 constexpr double kNothingToSee = 1e-3;
 
-Envelope envelope_of(const std::vector<double>& value, double begin, double period) {
-  Envelope e(begin, begin + static_cast<double>(value.size()) * period, 1200);
+/// By the time since the record began: a clock may tell that of 1970.
+Envelope envelope_of(const std::vector<double>& value, double period) {
+  Envelope e(0, static_cast<double>(value.size()) * period, 1200);
   for (std::size_t k = 0; k < value.size(); ++k)
-    if (std::isfinite(value[k])) e.add(begin + static_cast<double>(k) * period, value[k]);
+    if (std::isfinite(value[k])) e.add(static_cast<double>(k) * period, value[k]);
   return e;
 }
 
@@ -89,6 +90,10 @@ std::string quoted_label(std::string text) {
   return text;
 }
 
+std::string time_label(const Record& record) {
+  return record.begin == 0 ? "time  [s]" : fmt::format("time since {:.3f} s  [s]", record.begin);
+}
+
 }  // namespace
 
 std::string residual_figure(const Record& record, const ModelResiduals& residuals,
@@ -99,14 +104,14 @@ std::string residual_figure(const Record& record, const ModelResiduals& residual
                      fmt::format(
                          "set xrange [{:.9g}:{:.9g}]\nset key at graph 1,graph 1.25 "
                          "noopaque\n",
-                         record.begin, record.time_of(record.samples()));
+                         0.0, static_cast<double>(record.samples()) * record.period);
   const double top = 1 - 0.3 / (rows + 0.7), bottom = 0.4 / (rows + 0.7);
   const double height = (top - bottom) / rows;
   for (std::size_t i = 0; i < channels.size(); ++i) {
     const std::size_t c = channels[i];
     const ShownUnit unit = shown_unit(residuals.channels[c]);
-    const Envelope before = envelope_of(residuals.before[c], record.begin, record.period);
-    const Envelope after = envelope_of(residuals.after[c], record.begin, record.period);
+    const Envelope before = envelope_of(residuals.before[c], record.period);
+    const Envelope after = envelope_of(residuals.after[c], record.period);
     const std::string b = fmt::format("b{}", i), a = fmt::format("a{}", i);
     const double most = std::max(reach(before), reach(after)) * unit.factor;
     const double shown = most > kNothingToSee ? 1.1 * most : 1;
@@ -117,8 +122,9 @@ std::string residual_figure(const Record& record, const ModelResiduals& residual
             // gnuplot leaves a ylabel out beside long numbers.
             fmt::format("set label 1 '{} [{}]' at screen 0.018,graph 0.5 rotate center\n",
                         channel_name(residuals.channels[c]), unit.name);
-    text += i + 1 < channels.size() ? "set format x ''\nset xlabel ''\n"
-                                    : "set format x '%g'\nset xlabel 'time  [s]'\n";
+    text += i + 1 < channels.size()
+                ? "set format x ''\nset xlabel ''\n"
+                : "set format x '%g'\nset xlabel '" + time_label(record) + "'\n";
     text += "plot " + line(b.c_str(), i == 0 ? "before" : "", kOrange) + ", " +
             line(a.c_str(), i == 0 ? "after" : "", kInk) + "\n";
   }
@@ -150,7 +156,8 @@ std::vector<RelatedQuantity> related_quantities(const Record& record) {
                    {}});
   }
   RelatedQuantity time{.name = "time", .unit = "s", .value = {}, .speed = {}};
-  for (std::size_t k = 0; k < record.samples(); ++k) time.value.push_back(record.time_of(k));
+  for (std::size_t k = 0; k < record.samples(); ++k)
+    time.value.push_back(static_cast<double>(k) * record.period);
   all.push_back(std::move(time));
   return all;
 }

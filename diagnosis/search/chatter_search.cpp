@@ -16,6 +16,8 @@ namespace {
 /// Power over the noise around of a line, and of one that makes such a part of all noise.
 constexpr double kLoudLine = 300, kClear = 60, kPartOfNoise = 0.01;
 constexpr double kFrequency = 2;
+/// Part of its frequency that chatter may change by from run to run.
+constexpr double kSameTone = 0.25;
 /// Part of a frequency within which a line is the same, and times the power that is clearly more.
 constexpr double kSameLine = 0.03, kClearlyMore = 4;
 constexpr double kAmplitude = 30;  ///< differs as much as the frequency does by kFrequency
@@ -86,10 +88,8 @@ class ChatterSearch {
       c.unrest = u;
       c.times = *u.rms / was;
     }
-    const NoiseLine line = strongest(evidence_.noise().lines, axis, evidence_),
-                    was = strongest(healthy_.lines, axis, evidence_);
-    const bool as_before = was.strength > 0 && line.amplitude < 2 * was.amplitude;
-    if (line.strength > 0 && !as_before && !is_part_of_what_is_off(line)) {
+    const NoiseLine line = strongest(evidence_.noise().lines, axis, evidence_);
+    if (line.strength > 0 && !is_as_before(line) && !is_part_of_what_is_off(line)) {
       c.line = line;
       c.of_model = power_at(line, evidence_.declared()[index_of(line.channel)]) >
                    kClearlyMore * power_at(line, measured(line.channel));
@@ -106,6 +106,22 @@ class ChatterSearch {
   }
 
  private:
+  /// Whether the healthy machine had it in the same signal at half the size at least, or where that
+  /// tells nothing, in another signal of the drive.
+  bool is_as_before(const NoiseLine& line) const {
+    const auto alike = [&](const NoiseLine& was) {
+      return std::abs(was.frequency - line.frequency) < kSameTone * line.frequency;
+    };
+    const auto same_signal = [&](const NoiseLine& was) { return was.channel == line.channel; };
+    const auto& lines = healthy_.lines;
+    if (std::any_of(lines.begin(), lines.end(), same_signal))
+      return std::any_of(lines.begin(), lines.end(), [&](const NoiseLine& was) {
+        return same_signal(was) && alike(was) && line.amplitude < 2 * was.amplitude;
+      });
+    return std::any_of(lines.begin(), lines.end(), [&](const NoiseLine& was) {
+      return is_of_drive(was.channel, line.channel.axis) && alike(was);
+    });
+  }
   bool is_part_of_what_is_off(const NoiseLine& line) const {
     return std::any_of(measured_.begin(), measured_.end(), [&](const Unrest& u) {
       return u.channel == line.channel &&

@@ -67,7 +67,7 @@ Consequence consequence(const Evidence& evidence, const Prediction& a, const Pre
         probed ? reading : channels[c].kind == SignalKind::position && !is_rotary(channels[c].axis);
     if (contour) {
       sum += d.sum;
-      n = std::max(n, evidence.count(c, Role::both));
+      n = std::max(n, d.n);
     }
     const double noise = evidence.noise().channels[c].rms;
     if (d.n == 0 || noise <= 0) continue;

@@ -60,7 +60,7 @@ void sort_by_worth(std::vector<Contender>& all) {
 }  // namespace
 
 bool may_be_released(const DiagnosisOptions& options, const FreedNumber& n) {
-  return !n.common() && n.tolerance > 0 && !n.number.key.starts_with("effects.setup.") &&
+  return !n.common() && n.tolerance > 0 && !is_clamping(n.number.key) &&
          is_suspected(options.suspects, n.number.key);
 }
 

@@ -75,7 +75,7 @@ std::vector<double> ControllerCheck::equation(std::size_t axis,
       const double e_x = at(position, k), e_f = at(force, k),
                    e_m = e_x - (of_load ? at(twist, k) : 0);
       if (!std::isfinite(e_x + e_m + e_f)) continue;
-      const double demand = integral.high(e_f) / (kp * kv);
+      const double demand = (reset > 0 ? integral.high(e_f) : e_f) / (kp * kv);
       r[k] = of_position.low(e_x) + of_motor.high(e_m) + of_demand.low(demand);
     }
   }

@@ -137,16 +137,29 @@ Record without_outliers(Record record, const Replica& replica, const Machine& de
   return record;
 }
 
-/// Laps of a healthy run that do the same as a lap of another.
+bool knows_forces(const Record& record) {
+  return std::any_of(record.signals.begin(), record.signals.end(), [](const MeasuredSignal& s) {
+    return s.kind == SignalKind::applied_force || s.kind == SignalKind::added_force;
+  });
+}
+
+/// Laps of a healthy run that do the same as a lap of another: of the condition of the same number
+/// if they are at the same place, else any at that place (a run may begin with a motion that was
+/// broken off), else of that number wherever its encoders count from.
 std::vector<const Stretch*> partners(const Record& now, const Stretch& lap, const Record& healthy) {
-  std::vector<const Stretch*> laps;
-  for (const Stretch& h : healthy.stretches) {
-    const std::size_t a = h.end - h.begin, b = lap.end - lap.begin;
-    if (h.condition == lap.condition && (a > b ? a - b : b - a) <= kSlack &&
-        same_way(now, lap, healthy, h))
-      laps.push_back(&h);
-  }
-  return laps;
+  const auto all = [&](bool same_number, At place) {
+    std::vector<const Stretch*> laps;
+    for (const Stretch& h : healthy.stretches) {
+      const std::size_t a = h.end - h.begin, b = lap.end - lap.begin;
+      if ((h.condition == lap.condition || !same_number) && (a > b ? a - b : b - a) <= kSlack &&
+          same_way(now, lap, healthy, h, place))
+        laps.push_back(&h);
+    }
+    return laps;
+  };
+  std::vector<const Stretch*> laps = all(true, At::the_same_place);
+  if (laps.empty() && !knows_forces(healthy)) laps = all(false, At::the_same_place);
+  return laps.empty() ? all(true, At::any_place) : laps;
 }
 
 /// The sample of a healthy lap that is the sample k of another.
@@ -273,8 +286,7 @@ HealthyRun healthy_run(const Record& record, Replica& replica, const Machine& de
   const Record told = without_outliers(record, replica, declared);
   Evidence evidence(told, replica, declared);
   std::vector<FreedNumber> clamping = nuisances(declared);
-  std::erase_if(clamping,
-                [](const FreedNumber& n) { return !n.number.key.starts_with("effects.setup."); });
+  std::erase_if(clamping, [](const FreedNumber& n) { return !is_clamping(n.number.key); });
   const Machine machine = fit_numbers(evidence, declared, std::move(clamping)).machine;
   return {record,
           machine,

@@ -125,11 +125,11 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
   }
   count_valid();
   of_shifts_ = {};
-  std::vector<Column::Channels> of_laps;
+  shifts_.clear();
   if (!rounding.empty() && !per_shift_.empty())
-    of_laps = whitened_shifts(rms_shift(partition_.stretches, per_shift_, rounding));
-  for (const SeriesOfChannels& force : of_forces_) of_laps.push_back(whitened(force));
-  if (!of_laps.empty()) of_shifts_ = ShiftWhitening(partition_.stretches, of_laps);
+    shifts_ = whitened_shifts(rms_shift(partition_.stretches, per_shift_, rounding));
+  for (const SeriesOfChannels& force : of_forces_) shifts_.push_back(whitened(force));
+  if (!shifts_.empty()) of_shifts_ = ShiftWhitening(partition_.stretches, shifts_);
   if (rounding.empty()) return;
   rms_of_rounding_ = rms_of_all(rounding);
   chi2_of_rounding_ = chi2_of(whiten(rounding), Role::held_out);
@@ -292,7 +292,9 @@ void Evidence::leave_out_drive(std::size_t axis) {
     if (channel.axis != axis || is_reading(channel.kind)) continue;
     std::fill(valid_[c].begin(), valid_[c].end(), 0);
     fitted_count_[c] = held_out_count_[c] = 0;
+    for (Column::Channels& shift : shifts_) shift[c].clear();
   }
+  if (!shifts_.empty()) of_shifts_ = ShiftWhitening(partition_.stretches, shifts_);
 }
 
 std::vector<SeriesOfChannels> Evidence::readings_per_shift(

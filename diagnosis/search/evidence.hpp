@@ -186,7 +186,8 @@ class Evidence {
   std::vector<double> form_;
   Coloured coloured_ = Coloured::deviation;
   NoiseAudit noise_;
-  ShiftWhitening of_shifts_;
+  std::vector<Column::Channels> shifts_;  ///< whitened, of what laps are shifted by
+  ShiftWhitening of_shifts_;              ///< by these
   /// What is reckoned with of the rounding of each channel: RMS, and held-out chi-square.
   std::vector<double> rms_of_rounding_, chi2_of_rounding_;
 };

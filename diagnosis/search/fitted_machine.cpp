@@ -127,12 +127,6 @@ void stay(const Evidence& evidence, FittedMachine& m) {
   m.held_out = Ground(evidence, m.residual, m.linear()).held_out;
 }
 
-/// "effects.X.coulomb.level_N", "axes.X.load_kg": X.
-std::string place_of(const std::string& key) {
-  const std::size_t from = key.find('.') + 1;
-  return key.substr(from, key.find('.', from) - from);
-}
-
 bool is_axis(const std::string& place) {
   return std::find(kAxisNames.begin(), kAxisNames.end(), place) != kAxisNames.end();
 }
@@ -143,7 +137,7 @@ std::vector<std::size_t> concerned(const FittedMachine& m) {
   const std::set<std::string> places = places_found(m);
   std::vector<std::size_t> all;
   for (std::size_t i = 0; i < m.nuisances.numbers.size(); ++i) {
-    const std::string place = place_of(m.nuisances.numbers[i].number.key);
+    const std::string place = place_of_key(m.nuisances.numbers[i].number.key);
     if (!is_axis(place) || places.contains(place)) all.push_back(i);
   }
   return all;
@@ -258,8 +252,8 @@ std::vector<ActingSlices> FittedMachine::acting() const {
 
 std::set<std::string> places_found(const FittedMachine& m) {
   std::set<std::string> places;
-  for (const FreedNumber& n : m.numbers()) places.insert(place_of(n.number.key));
-  for (const ReleasedNumber& r : m.released) places.insert(place_of(r.key));
+  for (const FreedNumber& n : m.numbers()) places.insert(place_of_key(n.number.key));
+  for (const ReleasedNumber& r : m.released) places.insert(place_of_key(r.key));
   return places;
 }
 
@@ -270,7 +264,7 @@ std::string drive_of(const std::string& key, const std::vector<Candidate>& candi
         return is_of_drive(c) && std::any_of(c.numbers.begin(), c.numbers.end(),
                                              [&](const FreeNumber& n) { return n.key == key; });
       });
-  return of_drive ? place_of(key) : "";
+  return of_drive ? place_of_key(key) : "";
 }
 
 std::set<std::string> drives_found(const FittedMachine& m,
@@ -349,7 +343,7 @@ void add_common(const Evidence& evidence, FittedMachine& m,
                 const std::vector<FreedNumber>& common) {
   const std::set<std::string> places = places_found(m);
   for (const FreedNumber& n : common) {
-    const std::string place = place_of(n.number.key);
+    const std::string place = place_of_key(n.number.key);
     if (has_key(m.nuisances.numbers, n.number.key) || (is_axis(place) && !places.contains(place)))
       continue;
     m.nuisances.numbers.push_back(n);
@@ -362,7 +356,7 @@ void hold_common(FittedMachine& m) {
   const std::set<std::string> places = places_found(m);
   std::vector<FreedNumber> held;
   for (FreedNumber n : m.nuisances.numbers) {
-    const std::string place = place_of(n.number.key);
+    const std::string place = place_of_key(n.number.key);
     if (!n.common() || places.contains(place) || (!is_axis(place) && !places.empty())) continue;
     n.value = n.centre;
     held.push_back(n);

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "diagnosis/search/candidate.hpp"
+#include "model/fields.hpp"
 #include "model/parameters.hpp"
 
 namespace vcnc {
@@ -82,6 +83,26 @@ void put(const Parameter& p, Deviation* deviation, double value) {
 }
 
 }  // namespace
+
+double si_of_unit(const std::string& key) {
+  if (key.ends_with("_mm")) return unit::mm.to_si;
+  if (key.ends_with("_um")) return unit::um.to_si;
+  if (key.ends_with("_deg")) return unit::deg.to_si;
+  if (key.ends_with("_arcsec")) return unit::arcsec.to_si;
+  return 1;
+}
+
+std::string place_of_key(const std::string& key) {
+  const std::size_t from = key.find('.') + 1;
+  return key.substr(from, key.find('.', from) - from);
+}
+
+std::string effect_of_key(const std::string& key) {
+  const std::size_t from = key.find('.', key.find('.') + 1) + 1;
+  return key.substr(from, key.find('.', from) - from);
+}
+
+bool is_clamping(const std::string& key) { return key.starts_with("effects.setup."); }
 
 bool never_quite_absent(const std::string& key) {
   return std::any_of(std::begin(kResidues), std::end(kResidues), [&](const Tolerance& t) {
@@ -167,7 +188,7 @@ std::vector<FreedNumber> nuisances(const Machine& declared, Against against) {
     const bool free = told && told->free();
     if (tolerance <= 0 && !free) continue;
     // Counted in what is small, so that differences are taken near the declaration.
-    const bool clamped = p.key.starts_with("effects.setup.");
+    const bool clamped = is_clamping(p.key);
     const Range range = range_with_a_motor_side(
         declared, p.key,
         told && !told->between.empty() ? Range{told->between[0], told->between[1]} : p.range);

@@ -47,6 +47,14 @@ void take_values(std::vector<FreedNumber>& numbers, const Machine& machine);
 bool has_key(const std::vector<FreedNumber>& numbers, const std::string& key);
 /// Unit of a key's number: "um" of "gap_um", "" where it has none.
 std::string unit_of_key(const std::string& key);
+/// SI of one of a key's unit of length or angle; 1 of any other.
+double si_of_unit(const std::string& key);
+/// "X" of "effects.X.coulomb.level_N" and of "axes.X.load_kg"; what is no key, as it is.
+std::string place_of_key(const std::string& key);
+/// "coulomb" of "effects.X.coulomb.level_N".
+std::string effect_of_key(const std::string& key);
+/// Whether it says where the piece is clamped, which is no number of the machine.
+bool is_clamping(const std::string& key);
 
 /// What a machine is held against.
 enum class Against { declaration, healthy_run };

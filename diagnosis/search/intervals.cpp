@@ -28,8 +28,10 @@ double student_95(double freedom) {
 }
 
 /// The largest amplitude of the effect of a number that has its unit: what a law gets wrong about
-/// one of them shows in the others. In the unit of the key.
+/// one of them shows in the others. In the unit of the key; of a phase a radian, as what is as
+/// large as a share of the wave and not in phase with it turns it by that share of one.
 double size_of(const FittedMachine& machine, const FreedNumber& number) {
+  if (is_phase(number.number)) return 1 / si_of_unit(number.number.key);
   double largest = std::abs(number.value);
   for (const AddedEffect& a : machine.added) {
     if (!has_key(a.numbers, number.number.key) || number.shape || is_phase(number.number)) continue;

@@ -34,19 +34,39 @@ struct LapNoise {
   bool held_out = false;
 };
 
+/// Laps that a sample must have to be compared: all of them, as what one lap does alone was left
+/// out there and may be in the others, too; two, where samples are missing so often that a filter
+/// finds few without one.
+double laps_needed(const Series& there, std::size_t laps) {
+  constexpr std::size_t kRun = kWhiteningOrder + 1;
+  constexpr double kMostly = 0.5;
+  double in_runs = 0, some = 0;
+  std::size_t run = 0;
+  for (const double n : there) {
+    run = n == static_cast<double>(laps) ? run + 1 : 0;
+    in_runs += run >= kRun, some += n >= 2;
+  }
+  return in_runs < kMostly * some ? 2 : static_cast<double>(laps);
+}
+
 /// d_i of every lap of every condition that was repeated.
 std::vector<LapNoise> lap_noise(const Partition& partition, const Series& residual) {
   std::vector<LapNoise> all;
   for (const std::vector<Stretch>& of : partition.repetitions()) {
     const std::size_t length = of.front().end - of.front().begin;
-    const double n = static_cast<double>(of.size());
-    Series mean(length, 0.0);
+    Series there(length, 0.0), mean(length, 0.0);  // laps that have a sample, and their mean
     for (const Stretch& s : of)
-      for (std::size_t k = 0; k < length; ++k) mean[k] += residual[s.begin + k] / n;
+      for (std::size_t k = 0; k < length; ++k) there[k] += std::isfinite(residual[s.begin + k]);
+    for (const Stretch& s : of)
+      for (std::size_t k = 0; k < length; ++k)
+        if (const double r = residual[s.begin + k]; std::isfinite(r)) mean[k] += r / there[k];
+    const double needed = laps_needed(there, of.size());
     for (std::size_t i = 0; i < of.size(); ++i) {
       LapNoise lap{Series(length), i % 2 == 1};
       for (std::size_t k = 0; k < length; ++k)
-        lap.value[k] = (residual[of[i].begin + k] - mean[k]) * std::sqrt(n / (n - 1));
+        lap.value[k] = there[k] < needed ? kMissing
+                                         : (residual[of[i].begin + k] - mean[k]) *
+                                               std::sqrt(there[k] / (there[k] - 1));
       remove_line(lap.value);
       all.push_back(std::move(lap));
     }
@@ -319,7 +339,8 @@ NoiseAudit audit_noise(const Record& record, const Partition& partition,
     const double expected = noise.filter.scale * noise.filter.scale;
     const double left = left_by(noise.filter, laps);
     // Where the laps are quieter than the channel can be, what it can be counts.
-    noise.filter.scale = std::sqrt(quiet || covariance[0] > of_laps ? expected : left);
+    noise.filter.scale =
+        std::sqrt(quiet || covariance[0] > of_laps || !(left > 0) ? expected : left);
     noise.of_laps = std::min(1.0, left / (noise.filter.scale * noise.filter.scale));
     noise.once = filter_of_once(partition, residual[c], of_rounding, noise.filter, covariance[0]);
     const std::vector<NoiseLine> lines =

@@ -12,7 +12,6 @@
 namespace vcnc {
 namespace {
 
-bool ends(const std::string& text, const char* end) { return text.ends_with(end); }
 bool contains(const std::string& text, const char* part) {
   return text.find(part) != std::string::npos;
 }
@@ -22,14 +21,6 @@ std::size_t axis_of(const Candidate& c) {
   for (std::size_t i = 0; i < kAxisCount; ++i)
     if (c.place == kAxisNames[i]) return i;
   return kAxisCount;
-}
-
-double si_of_unit(const std::string& key) {
-  if (ends(key, "_mm")) return unit::mm.to_si;
-  if (ends(key, "_um")) return unit::um.to_si;
-  if (ends(key, "_deg")) return unit::deg.to_si;
-  if (ends(key, "_arcsec")) return unit::arcsec.to_si;
-  return 1;
 }
 
 /// Over the position of an axis, where its key has a unit of that.

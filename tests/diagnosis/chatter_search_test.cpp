@@ -234,6 +234,24 @@ TEST(ChatterSearch, NamesWhatMakesAnAxisTrembleAtRest) {
   EXPECT_EQ(clean.verdict, DiagnosisVerdict::no_deviation);
 }
 
+/// A hum of the force of a healthy machine is not what its position does now.
+TEST(ChatterSearch, AHumThatWasInTheForceHidesNoChatterOfThePosition) {
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, {}, 5);
+  std::vector<double> nothing(record.samples());
+  for (MeasuredSignal& s : record.signals)
+    if (s.kind == SignalKind::position) vibrate(s.value, nothing, kHertz, 5);
+  toy::ToyReplica replica(record);
+  const Evidence evidence(record, replica, {});
+  HealthyNoise healthy;
+  healthy.lines.push_back({{SignalKind::force, 0}, 50, 400, 2.0});
+  const auto found = [&] { return find_chatter(evidence, {}, {}, healthy); };
+  ASSERT_EQ(found().size(), 1U);
+  EXPECT_NEAR(found()[0].line.frequency, kHertz, 0.5);
+  healthy.lines.push_back({{SignalKind::position, 0}, 30, 400, 4e-6});
+  EXPECT_TRUE(found().empty());  // as before
+}
+
 TEST(ChatterSearch, AQuietMachineIsNotSimulated) {
   Record record = toy::commands(1000, 4);
   toy::measure(record, {}, 5);

@@ -784,6 +784,19 @@ TEST(LessHealthy, RefusesARunThatDoesOtherMotionsOfTheSameLength) {
   }
 }
 
+/// The numbers of motions count from the first of a record.
+TEST(LessHealthy, FindsTheSameMotionsWhereARunBeginsWithAnother) {
+  const Record healthy = measured({}, 45);
+  Record now = measured({}, 46);
+  for (Stretch& s : now.stretches) ++s.condition;
+  toy::ToyReplica of_healthy(healthy);
+  const HealthyRun run = healthy_run(healthy, of_healthy, {});
+  EXPECT_TRUE(same_program(now, healthy));
+  const Record less = less_healthy(now, run).record;
+  const std::vector<double>& reading = less.find(SignalKind::deflection, 0)->value;
+  EXPECT_TRUE(std::all_of(reading.begin(), reading.end(), [](double v) { return v == v; }));
+}
+
 TEST(LessHealthy, RefusesForcesThatOneRunKnowsAlone) {
   Record healthy = measured({}, 43), now = measured({}, 44);
   toy::ToyReplica of_healthy(healthy);
@@ -870,6 +883,27 @@ TEST(Diagnose, CanBeInterruptedAnywhere) {
     // What was not tried is not told as what this run cannot show.
     for (const Excitation& e : d.excitation) EXPECT_TRUE(e.excited) << times << " " << e.name;
   }
+}
+
+/// Of one lap each all is sought more than once; what the first time found is no verdict.
+TEST(Diagnose, CanBeInterruptedWhenAllIsSoughtOnceMore) {
+  Machine truth = toy::machine({{"effects.X.load_play.width_um", 2}});
+  move_number(truth, "effects.geometry.squareness.xy_urad", 40);
+  move_number(truth, "effects.X.scale_error.error_ppm", 80);
+  Record record = toy::commands(4000, 1);
+  toy::measure(record, truth, 8);
+  int asked = 0;
+  const auto stop_after = [&](int times) {
+    toy::ToyReplica replica(record);
+    asked = 0;
+    return diagnose({record, replica, {}, toy::candidates()}, {},
+                    [&](const DiagnosisProgress&) { return ++asked <= times; });
+  };
+  stop_after(1 << 30);
+  const int all = asked;
+  ASSERT_GT(all, 5);
+  for (int times = 0; times < all; times += std::max(1, all / 20))
+    EXPECT_EQ(stop_after(times).verdict, DiagnosisVerdict::interrupted) << times << " of " << all;
 }
 
 TEST(Commission, FindsFrictionOfAHealthyMachine) {

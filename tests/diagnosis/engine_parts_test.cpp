@@ -325,6 +325,18 @@ TEST(NoiseAudit, CountsWhatEncodersRoundOffThoughItRepeats) {
   EXPECT_NEAR(rms({rounding}).filter.scale, 50e-9, 2e-9);
 }
 
+/// Of every lap a fifth is missing, seldom the same.
+TEST(NoiseAudit, WhatIsMissingInOneLapIsComparedInTheOthers) {
+  Record record = toy::commands(2000, 4);
+  std::vector<double> noise(record.samples());
+  for (std::size_t k = 0; k < noise.size(); ++k)
+    noise[k] = gaussian_noise(4, 0, k)[0] < -0.84 ? kMissing : 30e-9 * gaussian_noise(3, 0, k)[0];
+  const ChannelNoise of =
+      audit_noise(record, partition(record), {{SignalKind::position, 0}}, {noise}).channels[0];
+  EXPECT_NEAR(of.rms, 30e-9, 1e-9);
+  EXPECT_NEAR(of.filter.scale, 30e-9, 1.5e-9);
+}
+
 /// A force that turns over with the axis is no noise, though nothing was repeated.
 TEST(NoiseAudit, OfOneMotionIsWhatItsPastDoesNotForetell) {
   Record record = toy::commands(24000, 1);

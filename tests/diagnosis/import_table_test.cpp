@@ -12,6 +12,7 @@
 
 #include "configs/config.hpp"
 #include "diagnosis/records/any_record.hpp"
+#include "diagnosis/records/commanded_motion.hpp"
 #include "diagnosis/records/record_check.hpp"
 #include "diagnosis/records/record_file.hpp"
 #include "tests/scratch.hpp"
@@ -775,6 +776,46 @@ class RecordFile : public testing::Test {
  protected:
   const Scratch folder_;
 };
+
+/// Of two encoders that of the loop of the map's machine has become the position.
+TEST_F(RecordFile, IsRefusedForAModelWhoseLoopHasTheOtherEncoder) {
+  Record record = imported(sound_map());
+  record.signals.push_back(record.signals.back());
+  record.signals.back().kind = SignalKind::twist;
+  Machine machine = declared();
+  machine.axes[kX].servo.feedback = ServoParams::Feedback::motor;
+  record.machine_toml = to_toml(machine);
+  const std::string file = folder_ / "run.h5";
+  write_record(record, file);
+  EXPECT_NO_THROW(load_record(file, "", folder_.write("same.toml", to_toml(machine))));
+  machine.axes[kX].servo.feedback = ServoParams::Feedback::load;
+  try {
+    load_record(file, "", folder_.write("other.toml", to_toml(machine)));
+    FAIL() << "accepted";
+  } catch (const MeasurementError& e) {
+    EXPECT_NE(std::string(e.what()).find("(axes.X.feedback)"), std::string::npos) << e.what();
+  }
+}
+
+/// A ramp has a step from sample to sample, and begins anywhere.
+TEST(CommandedMotionOfATable, IsNoMultipleOfTheStepsOfARamp) {
+  Columns all = columns();
+  all["cmd"] = [](double t) {
+    const double part = std::fmod(t, 4);
+    return 0.0512345 + 0.05 * (part < 2 ? part : 4 - part);
+  };
+  all["pos"] = [&](double t) { return all["cmd"](std::max(0.0, t - 0.004)); };
+  MeasuredTable table = table_of(all);
+  for (MeasuredColumn& c : table.columns)
+    if (c.name == "cmd")
+      for (double& v : c.value) v = std::round(v / 0.5e-6) * 0.5e-6;
+  const Record record = imported(
+      kTime + signal("cmd", "command", "X", "m") + signal("pos", "position", "X", "m"), table);
+  const CommandedMotion motion = commanded_motion(record);
+  const std::vector<double>& told = record.find(SignalKind::command, kX)->value;
+  for (std::size_t k = 0; k < told.size(); ++k)
+    ASSERT_NEAR(motion.position[kX][k], told[k], 1e-9) << k;
+}
 
 TEST_F(RecordFile, ADamagedOneIsStillARecordAndIsToldAsSuch) {
   const std::string file = folder_ / "run.h5";

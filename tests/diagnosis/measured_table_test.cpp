@@ -24,7 +24,8 @@ TEST(MeasuredTable, ReadsEverySeparatorQuotesRemarksAndUnitLines) {
        {"t,q\n0,1.5\n0.001,-2e-3\n", "t;q\r\n0;1.5\r\n0.001;-2e-3\r\n",
         "t\tq\n0\t1.5\n0.001\t-2e-3", "# made by a logger\n\"t\",\"q\"\n0,\"1.5\"\n0.001,-2e-3\n",
         "t q\n 0  1.5\n0.001 -2e-3 \n", "# t,q\n0,1.5\n0.001,-2e-3\n",
-        "t,q\ns,m\n0,1.5\n0.001,-2e-3\n", "\xEF\xBB\xBFt,q,\n0,+1.5,\n0.001,-2e-3,\n"}) {
+        "t,q\ns,m\n0,1.5\n0.001,-2e-3\n", "t,q\ns,1\n0,1.5\n0.001,-2e-3\n",
+        "\xEF\xBB\xBFt,q,\n0,+1.5,\n0.001,-2e-3,\n"}) {
     const MeasuredTable table = parse_text_table(text, "run.csv");
     ASSERT_EQ(table.columns.size(), 2u) << text;
     EXPECT_EQ(table.columns[0].name, "t") << text;
@@ -39,6 +40,11 @@ TEST(MeasuredTable, WithoutHeadingsColumnsAreCalledByTheirNumbers) {
   const MeasuredTable table = parse_text_table("1,2\n3,4\n", "run.csv");
   EXPECT_EQ(table.columns[1].name, "2");
   EXPECT_EQ(table.rows(), 2u);
+  // A remark with quotes of its own names nothing.
+  const MeasuredTable remarked =
+      parse_text_table("# \"S piece\" second lap\n1,2\n3,4\n", "run.csv");
+  EXPECT_EQ(remarked.columns[1].name, "2");
+  EXPECT_EQ(remarked.rows(), 2u);
 }
 
 TEST(MeasuredTable, WhatIsMissingIsNaNAndWhatIsNoNumberIsRemembered) {

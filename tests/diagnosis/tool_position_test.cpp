@@ -127,6 +127,37 @@ TEST(ToolPosition, OfAHeldBallIsTheClosedFormOfAnAxisThatIsElsewhere) {
   EXPECT_NEAR(farthest, 40e-6, 1e-6);
 }
 
+/// Whatever C is when the run begins, the frame is that of X, Y and Z.
+TEST(ToolPosition, IsToldInTheFrameOfTheAxesWhereTheRunBegins) {
+  for (const double turned : {90 * kDegree, 180 * kDegree}) {
+    Record run = on_the_grid(1);
+    for (MeasuredSignal& s : run.signals)
+      if (s.kind == SignalKind::command && s.axis == kC)
+        std::fill(s.value.begin(), s.value.end(), turned);
+    const MachineReplica replica(run, trunnion(), std::nullopt);
+    const Prediction p = replica.predict(trunnion());
+    for (std::size_t c = 0; c < p.size(); ++c) {
+      const auto& [kind, axis] = replica.channels()[c];
+      if (kind != SignalKind::tool_position) continue;
+      const std::vector<double>& told = run.find(SignalKind::command, axis)->value;
+      for (std::size_t k = 0; k < run.samples(); k += 10)
+        EXPECT_NEAR(p[c][k], told[k] - run.on_table->zero[static_cast<Eigen::Index>(axis)], 2e-3);
+    }
+  }
+}
+
+/// What is declared of the probe that touches is none of a grid's.
+TEST(ToolPosition, KnowsNothingOfTheDeclaredProbe) {
+  const Record run = on_the_grid(1);
+  Machine probing = trunnion();
+  move_number(probing, "effects.probe.probe_gain.gain_percent.x", 1);
+  const MachineReplica replica(run, probing, std::nullopt), plain(run, trunnion(), std::nullopt);
+  const Prediction p = replica.predict(probing), q = plain.predict(trunnion());
+  ASSERT_EQ(p.size(), q.size());
+  for (std::size_t c = 0; c < p.size(); ++c)
+    for (std::size_t k = 0; k < run.samples(); ++k) EXPECT_EQ(p[c][k], q[c][k]);
+}
+
 TEST(ToolPosition, OnAGridIsWhereTheAxesAre) {
   const Record run = on_the_grid(1);
   const MachineReplica replica(run, trunnion(), std::nullopt);
