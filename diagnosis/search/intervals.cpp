@@ -27,6 +27,12 @@ double student_95(double freedom) {
   return z + g1 / n + g2 / (n * n) + g3 / (n * n * n) + g4 / (n * n * n * n);
 }
 
+/// A time constant of nought, and the like, is that the effect has none: it would be another one
+/// with the least of it, so that no slope there tells how well that is known.
+bool is_none_of_its_shape(const FreedNumber& number) {
+  return number.shape && number.value == 0 && number.number.min == 0;
+}
+
 /// The largest amplitude of the effect of a number that has its unit: what a law gets wrong about
 /// one of them shows in the others. In the unit of the key; of a phase a radian, as what is as
 /// large as a share of the wave and not in phase with it turns it by that share of one.
@@ -139,8 +145,9 @@ std::map<std::string, Interval> intervals_of(const Evidence& evidence, const Fit
 
   std::vector<Eigen::Index> every, but_shapes;
   for (Eigen::Index i = 0; i < n; ++i) {
-    every.push_back(i);
-    if (!all.numbers[static_cast<std::size_t>(i)].shape) but_shapes.push_back(i);
+    const FreedNumber& number = all.numbers[static_cast<std::size_t>(i)];
+    if (!is_none_of_its_shape(number)) every.push_back(i);
+    if (!number.shape) but_shapes.push_back(i);
   }
   const auto fill = [&](const std::vector<Eigen::Index>& some, double Interval::*width) {
     const HalfWidths widths = half_widths(of, some);

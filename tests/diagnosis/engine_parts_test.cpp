@@ -833,6 +833,11 @@ TEST(Intervals, AShapeThatDoesTheSameLeavesAnAmplitudeKnownWithIt) {
   EXPECT_GT(of.half_width, 50);
   EXPECT_LT(of.shapes_known, 1);
   EXPECT_FALSE(may_be_as_declared(drift, Machine(), intervals));
+  FreedNumber& none = m.added.back().numbers.back();  // a time constant of nought: a straight line
+  none.value = none.number.min = 0;
+  EXPECT_NEAR(intervals_of(evidence, m).at(height.number.key).half_width, of.shapes_known, 1e-9);
+  EXPECT_EQ(intervals_of(evidence, m).count(none.number.key), 0U);
+  none = slowness;
   m.columns = {column, evidence.sensitivity(m.prediction, m.prediction, 1)};  // it does nothing
   EXPECT_NEAR(intervals_of(evidence, m).at(height.number.key).half_width, of.shapes_known, 1e-6);
 }
