@@ -655,7 +655,13 @@ class Report {
     if (law.gain < needed || (quiet && !withdrawn_)) return;
     d_.law = law.law;
     d_.found = law.machine;
-    for (const auto& [key, value] : put_back_) move_number(d_.found, key, value);
+    // What is not told goes out of it, unless the law was learnt beside that.
+    Machine less = law.machine;
+    for (const auto& [key, value] : put_back_) move_number(less, key, value);
+    const auto held_out = [&](const Machine& m) {
+      return evidence_.chi2(evidence_.residual(evidence_.predict(m)), Role::held_out);
+    };
+    if (held_out(less) < held_out(law.machine) + options_.least_gain) d_.found = std::move(less);
   }
 
   /// Of candidates, from those of the trials: the smallest size that is seen; of limits the
