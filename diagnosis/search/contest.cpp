@@ -20,9 +20,11 @@ namespace {
 constexpr double kHopeless = 100;      ///< times what is to be explained: a loop that is unstable
 constexpr int kGlance = 4;             ///< iterations to see what a candidate is worth
 constexpr double kUsual = 1;           ///< decades about the typical size, or of tolerances
+constexpr double kUsualShape = 2;      ///< decades about the typical period, speed or time
 constexpr double kShows = 0.02;        ///< part of a gain that a channel must have to be concerned
 constexpr double kChance = 3;          ///< standard deviations of a sum of squares
 constexpr double kOfTolerances = 0.3;  ///< numbers, for a decade of tolerances more
+constexpr double kMoreUsual = 0.2;     ///< numbers: a declared one by 50 tolerances
 constexpr double kNothing = 0.03;      ///< of a typical size
 constexpr double kPromise = 0.3;       ///< of what is needed: worth a refit
 constexpr double kHope = 0.5;          ///< of what is needed: worth to be refitted to the end
@@ -50,6 +52,11 @@ std::vector<std::size_t> shown_in(const std::vector<double>& before,
   for (std::size_t c = 0; c < before.size(); ++c)
     if (before[c] - after[c] > kShows * gain) channels.push_back(c);
   return channels;
+}
+
+/// Decades that a size is further from the typical one, which is 1, than is usual.
+double unusual(double size, double usual) {
+  return std::max(0.0, std::abs(std::log10(size)) - usual);
 }
 
 void sort_by_worth(std::vector<Contender>& all) {
@@ -189,6 +196,12 @@ bool Contest::says_it_simpler(const Contender& rival, const AddedEffect& effect,
   return intricacy(rival) + (gain - rival.gain) / band_of(gain) < intricacy(effect);
 }
 
+bool Contest::is_more_usual(const Contender& rival, const FreedNumber& number, double gain) const {
+  const double band = band_of(gain), less = gain - rival.gain;
+  return rival.released.empty() && less < band &&
+         intricacy(rival) + std::max(0.0, less) / band < intricacy(number) - kMoreUsual;
+}
+
 double Contest::intricacy(const AddedEffect& effect) const {
   Contender same;
   same.candidate = effect.candidate;
@@ -283,25 +296,31 @@ void Contest::put_simplest_first(std::vector<Contender>& all) const {
   std::rotate(all.begin(), simplest, simplest + 1);
 }
 
-/// Numbers that are something, and two for every further tenth or tenfold of a usual size. Of
-/// declared numbers that do the same, the one by the fewest tolerances.
+/// Numbers that are something, and two for every further tenth or tenfold of a usual size, or of a
+/// shape (a screw of 12 mm is no grating). Of declared numbers that do the same, the one by the
+/// fewest tolerances.
 double Contest::intricacy(const Contender& c) const {
-  if (!c.released.empty()) {
-    const FreedNumber& n = c.numbers.front();
-    const double tolerances = std::abs(n.value - n.centre) / n.number.typical;
-    return 1 + kOfTolerances * std::max(0.0, std::log10(tolerances) - kUsual);
-  }
-  double largest = 0;
+  if (!c.released.empty()) return intricacy(c.numbers.front());
+  double largest = 0, odd_shape = 0;
   std::size_t numbers = c.numbers.size();
   for (const FreedNumber& n : c.numbers)
-    for (const FreeNumber& own : rules_.candidates[c.candidate].numbers)
-      if (own.key == n.number.key && !n.shape && !is_phase(own) && own.typical != 0) {
-        const double size = std::abs(n.value / own.typical);
+    for (const FreeNumber& own : rules_.candidates[c.candidate].numbers) {
+      if (own.key != n.number.key || is_phase(own) || own.typical == 0) continue;
+      const double size = std::abs(n.value / own.typical);
+      if (!n.shape) {
         largest = std::max(largest, size);
         numbers -= size < kNothing;
+      } else if (own.min > 0 && own.typical > 0) {
+        odd_shape = std::max(odd_shape, unusual(size, kUsualShape));
       }
-  const double unusual = largest > 0 ? std::max(0.0, std::abs(std::log10(largest)) - kUsual) : 0;
-  return static_cast<double>(numbers) + 2 * unusual;
+    }
+  return static_cast<double>(numbers) +
+         2 * ((largest > 0 ? unusual(largest, kUsual) : 0) + odd_shape);
+}
+
+double Contest::intricacy(const FreedNumber& declared) {
+  const double tolerances = std::abs(declared.value - declared.centre) / declared.number.typical;
+  return 1 + kOfTolerances * std::max(0.0, std::log10(tolerances) - kUsual);
 }
 
 Contender Contest::contender(const std::vector<const TrialColumns*>& trials,

@@ -86,10 +86,15 @@ class Contest {
   std::vector<Contender> rivals(double least, std::size_t but) const;
   /// Whether a declared number does as well as an effect that gains `gain`, and says less.
   bool says_it_simpler(const Contender& rival, const AddedEffect& effect, double gain) const;
+  /// Whether an effect of a usual size does as well as a declared number, which gains `gain`, and
+  /// that is as far off as hardly any is.
+  bool is_more_usual(const Contender& rival, const FreedNumber& number, double gain) const;
 
   /// How much it says: numbers that are something, and more where one is of an unusual size.
   double intricacy(const AddedEffect& effect) const;
   double intricacy(const Contender& contender) const;
+  /// Of a declared number out of tolerance.
+  static double intricacy(const FreedNumber& declared);
 
   /// Gains that differ by less are alike when the best is `gain`.
   double band_of(double gain) const;

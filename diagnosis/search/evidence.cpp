@@ -8,6 +8,7 @@
 #include "diagnosis/search/column_products.hpp"
 #include "diagnosis/search/comparable.hpp"
 #include "diagnosis/search/parallel.hpp"
+#include "diagnosis/search/turning_weight.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {
@@ -123,6 +124,7 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
     channel.once.scale *= noise_scale(c) * louder;
     channel.of_laps /= louder * louder;
   }
+  weigh_turning();
   count_valid();
   of_shifts_ = {};
   shifts_.clear();
@@ -252,6 +254,16 @@ void Evidence::leave_out_undecided(const SeriesOfChannels& rounding) {
   }
 }
 
+void Evidence::weigh_turning() {
+  weight_.assign(difference_.size(), {});
+  const std::vector<ComparedChannel>& channels = replica_.channels();
+  if (!std::all_of(channels.begin(), channels.end(),
+                   [](const ComparedChannel& c) { return is_reading(c.kind); }))
+    return;
+  for (std::size_t c = 0; c < weight_.size(); ++c)
+    weight_[c] = turning_weight(difference_[c], reckoned_with(c), record_.period);
+}
+
 void Evidence::count_valid() {
   valid_.clear();
   fitted_count_.clear();
@@ -268,7 +280,8 @@ void Evidence::count_valid() {
       for (std::size_t k = block.begin; k-- > 0 && run < order && raw_valid_[c][k];) ++run;
       for (std::size_t k = block.begin; k < block.end; ++k) {
         valid_[c][k] = raw_valid_[c][k] && run >= order;
-        count += valid_[c][k];
+        const double w = weight_[c].empty() ? 1 : static_cast<double>(weight_[c][k]);
+        if (valid_[c][k]) count += w * w;
         run = raw_valid_[c][k] ? run + 1 : 0;
       }
     }
@@ -331,6 +344,7 @@ std::vector<float> Evidence::whiten(std::size_t channel, const std::vector<doubl
   constexpr std::size_t kAtATime = 256;
   const ChannelNoise& noise = noise_.channels[channel];
   const std::vector<char>& valid = valid_[channel];
+  const std::vector<float>& weight = weight_[channel];
   std::vector<float> z(series.size(), 0.0F);
   double v[kAtATime];
   for (const RecordBlock& block : partition_.blocks) {
@@ -350,6 +364,7 @@ std::vector<float> Evidence::whiten(std::size_t channel, const std::vector<doubl
         for (std::size_t i = 0; i < n; ++i) v[i] -= a * before[i];
       }
       for (std::size_t i = 0; i < n; ++i) z[k + i] = static_cast<float>(v[i] * per_scale);
+      for (std::size_t i = 0; i < n && !weight.empty(); ++i) z[k + i] *= weight[k + i];
       k += n;
     }
   }
@@ -453,14 +468,16 @@ std::vector<double> Evidence::chi2_of(const Column& column, Role role) const {
   return all;
 }
 
-double Evidence::rms_of(const std::vector<double>& series, std::size_t channel, Role role) const {
+double Evidence::rms_of(const std::vector<double>& series, std::size_t channel, Role role,
+                        const std::vector<float>& weight) const {
   double sum = 0, n = 0;
   for (const RecordBlock& block : partition_.blocks) {
     if (!takes(block, role)) continue;
     for (std::size_t k = block.begin; k < block.end; ++k) {
       if (!raw_valid_[channel][k] || !std::isfinite(series[k])) continue;
-      sum += series[k] * series[k];
-      n += 1;
+      const double w = weight.empty() ? 1 : static_cast<double>(weight[k]);
+      sum += w * w * series[k] * series[k];
+      n += w * w;
     }
   }
   return n > 0 ? std::sqrt(sum / n) : 0;
@@ -484,7 +501,7 @@ std::vector<double> Evidence::rms_within_laps(const Prediction& prediction, Role
       std::fill(off[c].begin() + static_cast<std::ptrdiff_t>(block.begin),
                 off[c].begin() + static_cast<std::ptrdiff_t>(block.end), kMissing);
   std::vector<double> all;
-  for (std::size_t c = 0; c < off.size(); ++c) all.push_back(rms_of(off[c], c, role));
+  for (std::size_t c = 0; c < off.size(); ++c) all.push_back(rms_of(off[c], c, role, weight_[c]));
   return all;
 }
 

@@ -11,6 +11,8 @@
 // Only samples that can be compared count (comparable.hpp), none outside every stretch, not what an
 // axis does in one lap and not in another (lap_events.hpp), and not moments at which the rounding
 // of an encoder decides what an axis does (whether friction holds it here or a little further).
+// Where no signal of a drive is recorded, readings weigh little where their deviation goes over
+// from one state to another (turning_weight.hpp).
 #pragma once
 
 #include <Eigen/Dense>
@@ -123,8 +125,8 @@ class Evidence {
   /// RMS of y - yhat in SI over the samples that count.
   double rms(const Prediction& prediction, std::size_t channel, Role role) const;
 
-  /// Of every channel, less what shifts of the piece, other ones in every lap, make of the
-  /// readings; where motions were repeated, of those alone.
+  /// Of every channel, as samples weigh, less what shifts of the piece, other ones in every lap,
+  /// make of the readings; where motions were repeated, of those alone.
   std::vector<double> rms_within_laps(const Prediction& prediction, Role role) const;
 
   /// Products of all pairs of the columns, per block.
@@ -146,7 +148,8 @@ class Evidence {
   /// Sample by sample, whatever laps are shifted by.
   Column::Channels whitened(const SeriesOfChannels& change) const;
   /// Of what can be compared of a channel.
-  double rms_of(const std::vector<double>& series, std::size_t channel, Role role) const;
+  double rms_of(const std::vector<double>& series, std::size_t channel, Role role,
+                const std::vector<float>& weight = {}) const;
   /// Of the variance of a channel's noise: what the steps of the signal as recorded make, 0 .. 1.
   double share_of_steps(std::size_t channel) const;
   bool is_within_steps(const Prediction& prediction, std::size_t channel) const;
@@ -160,6 +163,8 @@ class Evidence {
   void leave_out(const std::vector<LapEvent>& events);
   void leave_out_undecided(const SeriesOfChannels& rounding);
   void count_valid();
+  /// Where no signal of a drive is recorded (turning_weight.hpp).
+  void weigh_turning();
   /// Of a standard deviation of each shift of the piece.
   std::vector<Column::Channels> whitened_shifts(const Eigen::Vector3d& shift) const;
   /// Says nothing of samples that cannot be compared.
@@ -176,7 +181,8 @@ class Evidence {
   SeriesOfChannels measured_;
   Prediction declared_;
   std::vector<std::vector<char>> raw_valid_, valid_;
-  std::vector<double> fitted_count_, held_out_count_;  ///< of valid_, per channel
+  std::vector<std::vector<float>> weight_;             ///< of every sample; a channel without: 1
+  std::vector<double> fitted_count_, held_out_count_;  ///< of valid_ as they weigh, per channel
   std::vector<LapEvent> events_;
   SeriesOfChannels difference_;              ///< from the declared machine, without drifts
   std::vector<SeriesOfChannels> per_shift_;  ///< of the piece; empty without a probe

@@ -614,7 +614,8 @@ class Search {
       const double worth =
           contest.counts(m) - 4 * static_cast<double>(effect ? effect->numbers.size() : 1);
       const auto simpler = [&](const Contender& r) {
-        return effect && contest.says_it_simpler(r, *effect, lost);
+        return effect ? contest.says_it_simpler(r, *effect, lost)
+                      : contest.is_more_usual(r, number_of_key(m, number->key), lost);
       };
       // What is missing still, one that has more numbers may imitate a little of.
       const double imitated = kHalf * rules_.excess(m.held_out);
@@ -643,6 +644,11 @@ class Search {
       evidence_.anchor(m.machine);
       ++i;
     }
+  }
+
+  static const FreedNumber& number_of_key(const FittedMachine& m, const std::string& key) {
+    return *std::find_if(m.nuisances.numbers.begin(), m.nuisances.numbers.end(),
+                         [&](const FreedNumber& n) { return n.number.key == key; });
   }
 
   /// Whether what was added last is not as declared for certain: else it is not told, and what is

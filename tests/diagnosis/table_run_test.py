@@ -17,6 +17,7 @@ import ball_bar
 import r_test
 
 VCNC = ""
+SMALL = 0.05  # circle [m]
 
 
 class Run(unittest.TestCase):
@@ -52,8 +53,17 @@ class BallBar(Run):
     """Two laps each way, against the same machine's bar test with the ball set anew."""
 
     def test_a_machine_as_it_was(self):
-        ball_bar.generate(self.home, [], seed=3, laps=2)
+        ball_bar.generate(self.home, [], seed=3, laps=2, radius=SMALL)
         self.check_as_it_was(self.diagnosed())
+
+    def test_play_is_named_with_its_size_though_friction_turns_over_by_another_law(self):
+        gap = 6.0
+        ball_bar.generate(self.home, [("backlash", "X", {"gap_um": gap})], seed=4, laps=2, radius=SMALL)
+        report = self.diagnosed()
+        self.assertEqual((report["verdict"], [(e["name"], e["axis"]) for e in report["effects"]]), ("EXPLAINED", [("backlash", "X")]))
+        told = report["effects"][0]["parameters"][0]
+        self.assertAlmostEqual(told["value"], gap, delta=0.05 * gap)
+        self.assertTrue(told["low"] < gap < told["high"], told)
 
     def test_squareness_is_named_with_its_size(self):
         truth = {"xy_urad": 60.0}
