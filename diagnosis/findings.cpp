@@ -33,6 +33,8 @@ constexpr double kKnownTogether = 0.2;
 constexpr double kFloorScatter = 0.04;
 /// Times the noise of a sample by which readings may shift from lap to lap.
 constexpr double kShifted = 3;
+/// Times what is declared that no declared number is.
+constexpr double kUnlikelyTimes = 4;
 const EffectText* text_of(const std::string& effect) {
   const EffectText* text = nullptr;
   for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
@@ -247,6 +249,7 @@ class Report {
       const FittedMachine held = found().holding(key, selection_.base);
       e.gain = Ground(evidence_, held.residual, held.linear()).held_out - found().held_out;
       tell_class(e, released->class_with);
+      tell_unlikely(n);
       d_.effects.push_back(std::move(e));
     }
     if (withheld_ || !held_.empty()) fit_what_is_told();
@@ -276,6 +279,16 @@ class Report {
                       "effect has, and what is there is probably something else.",
                       n.number.key, n.number.max));
     }
+  }
+
+  /// A declared number that no builder could be so wrong about.
+  void tell_unlikely(const FreedNumber& n) {
+    const double times = n.centre == 0 ? 1 : n.value / n.centre;
+    if (times > 0 && times < kUnlikelyTimes && 1 / times < kUnlikelyTimes) return;
+    d_.warnings.push_back(fmt::format(
+        "{} would be {:.2g} times what is declared: what is there is probably something "
+        "else that acts like it.",
+        n.number.key, times));
   }
 
   void tell_class(FoundEffect& e, const std::vector<std::size_t>& others) {

@@ -27,6 +27,8 @@ constexpr double kQuieter = 0.8, kColoured = 1.1;
 /// Times what encoders usually make of a signal, or laps differ by, from which on they decide what
 /// an axis does; and how long before and after.
 constexpr double kUndecided = 6, kUndecidedReach = 0.02;  // [s]
+/// Below such a weight a reading tells nothing of noise.
+constexpr float kTurnsOver = 0.5F;
 
 /// Those columns that have something in a channel, and where they stand among all.
 struct Present {
@@ -116,7 +118,12 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
   leave_out_undecided(rounding);
   mask(rounding);
   mask(difference_);
-  noise_ = audit_noise(record_, partition_, replica_.channels(), difference_, rounding, coloured_);
+  weight_.assign(difference_.size(), {});
+  noise_ = audited(difference_, rounding, coloured_);
+  if (weigh_turning()) {
+    noise_ = audited(difference_, rounding, coloured_);
+    weigh_turning();
+  }
   for (std::size_t c = 0; c < noise_.channels.size(); ++c) {
     ChannelNoise& channel = noise_.channels[c];
     const double louder = c < form_.size() ? std::hypot(1, form_[c] / channel.rms) : 1;
@@ -124,7 +131,6 @@ void Evidence::reckon_with_rounding(const Machine& machine) {
     channel.once.scale *= noise_scale(c) * louder;
     channel.of_laps /= louder * louder;
   }
-  weigh_turning();
   count_valid();
   of_shifts_ = {};
   shifts_.clear();
@@ -185,8 +191,7 @@ void Evidence::take_noise_from(const Machine& machine) {
 
 bool Evidence::noise_is_another_with(const Machine& machine) const {
   const SeriesOfChannels left = left_by(machine);
-  const NoiseAudit now = audit_noise(record_, partition_, replica_.channels(), left,
-                                     rounding_of(machine), Coloured::noise);
+  const NoiseAudit now = audited(left, rounding_of(machine), Coloured::noise);
   const std::vector<double> rms = rms_of_all(left);
   for (std::size_t c = 0; c < now.channels.size(); ++c) {
     const double sigma = noise_.channels[c].rms;
@@ -254,14 +259,22 @@ void Evidence::leave_out_undecided(const SeriesOfChannels& rounding) {
   }
 }
 
-void Evidence::weigh_turning() {
-  weight_.assign(difference_.size(), {});
+NoiseAudit Evidence::audited(SeriesOfChannels series, const SeriesOfChannels& rounding,
+                             Coloured coloured) const {
+  for (std::size_t c = 0; c < series.size(); ++c)
+    for (std::size_t k = 0; k < weight_[c].size(); ++k)
+      if (weight_[c][k] < kTurnsOver) series[c][k] = kMissing;
+  return audit_noise(record_, partition_, replica_.channels(), series, rounding, coloured);
+}
+
+bool Evidence::weigh_turning() {
   const std::vector<ComparedChannel>& channels = replica_.channels();
   if (!std::all_of(channels.begin(), channels.end(),
                    [](const ComparedChannel& c) { return is_reading(c.kind); }))
-    return;
+    return false;
   for (std::size_t c = 0; c < weight_.size(); ++c)
-    weight_[c] = turning_weight(difference_[c], reckoned_with(c), record_.period);
+    weight_[c] = turning_weight(difference_[c], noise_.channels[c].rms, record_.period);
+  return true;
 }
 
 void Evidence::count_valid() {

@@ -163,8 +163,11 @@ class Evidence {
   void leave_out(const std::vector<LapEvent>& events);
   void leave_out_undecided(const SeriesOfChannels& rounding);
   void count_valid();
-  /// Where no signal of a drive is recorded (turning_weight.hpp).
-  void weigh_turning();
+  /// False: the signals of drives tell how axes turn (turning_weight.hpp).
+  bool weigh_turning();
+  /// What of a series is noise where nothing turns over.
+  NoiseAudit audited(SeriesOfChannels series, const SeriesOfChannels& rounding,
+                     Coloured coloured) const;
   /// Of a standard deviation of each shift of the piece.
   std::vector<Column::Channels> whitened_shifts(const Eigen::Vector3d& shift) const;
   /// Says nothing of samples that cannot be compared.

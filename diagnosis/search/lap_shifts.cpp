@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -29,16 +30,50 @@ struct LapShift {
   Eigen::VectorXd weight;  ///< sum of squares of what each makes of the lap
 };
 
+/// Per channel and sample of a lap, counted from its beginning.
+using LapFlags = std::vector<std::vector<char>>;
+
+/// Where all laps of each condition have readings.
+std::map<int, LapFlags> read_in_all(const std::vector<Stretch>& laps,
+                                    const SeriesOfChannels& series) {
+  std::map<int, LapFlags> all;
+  for (const Stretch& lap : laps) {
+    const std::size_t length = lap.end - lap.begin;
+    LapFlags& flags =
+        all.try_emplace(lap.condition, series.size(), std::vector<char>(length, 1)).first->second;
+    for (std::size_t c = 0; c < series.size(); ++c) {
+      flags[c].resize(std::min(flags[c].size(), length));
+      for (std::size_t i = 0; i < flags[c].size(); ++i)
+        flags[c][i] = flags[c][i] && std::isfinite(series[c][lap.begin + i]);
+    }
+  }
+  return all;
+}
+
+/// Whether most of what is known of a lap is known of all of its condition.
+bool mostly_in_all(const Stretch& lap, const LapFlags& in_all, const SeriesOfChannels& series) {
+  constexpr double kMost = 0.5;
+  double known = 0, shared = 0;
+  for (std::size_t c = 0; c < series.size(); ++c) {
+    for (std::size_t k = lap.begin; k < lap.end; ++k) known += std::isfinite(series[c][k]);
+    shared += static_cast<double>(std::count(in_all[c].begin(), in_all[c].end(), 1));
+  }
+  return shared > kMost * known;
+}
+
+/// By all that is known of the lap, or `only` by some samples.
 LapShift shift_of(const Stretch& lap, const std::vector<SeriesOfChannels>& per_shift,
-                  const SeriesOfChannels& series, Shifts shifts = Shifts::growing) {
+                  const SeriesOfChannels& series, Shifts shifts = Shifts::growing,
+                  const LapFlags* only = nullptr) {
   const auto columns =
       static_cast<Eigen::Index>((shifts == Shifts::growing ? 2 : 1) * per_shift.size());
   Eigen::MatrixXd products = Eigen::MatrixXd::Zero(columns, columns);
   Eigen::VectorXd with_series = Eigen::VectorXd::Zero(columns), x(columns);
   for (std::size_t c = 0; c < series.size(); ++c) {
     if (per_shift[0][c].empty()) continue;
-    for (std::size_t k = lap.begin; k < lap.end; ++k) {
-      if (!std::isfinite(series[c][k])) continue;
+    const std::size_t end = only ? lap.begin + (*only)[c].size() : lap.end;
+    for (std::size_t k = lap.begin; k < end; ++k) {
+      if (!std::isfinite(series[c][k]) || (only && !(*only)[c][k - lap.begin])) continue;
       fill_row(per_shift, lap, c, k, x);
       products.noalias() += x * x.transpose();
       with_series += x * series[c][k];
@@ -97,8 +132,12 @@ Eigen::Vector3d rms_shift(const std::vector<Stretch>& laps,
 void take_out_shifts(const std::vector<Stretch>& laps,
                      const std::vector<SeriesOfChannels>& per_shift, SeriesOfChannels& series,
                      Shifts shifts) {
+  const std::map<int, LapFlags> read = read_in_all(laps, series);
   for (const Stretch& lap : laps) {
-    const Eigen::VectorXd shift = shift_of(lap, per_shift, series, shifts).shift;
+    const LapFlags& in_all = read.at(lap.condition);
+    const bool alike = mostly_in_all(lap, in_all, series);
+    const Eigen::VectorXd shift =
+        shift_of(lap, per_shift, series, shifts, alike ? &in_all : nullptr).shift;
     Eigen::VectorXd x(shift.size());
     for (std::size_t c = 0; c < series.size(); ++c) {
       if (per_shift[0][c].empty()) continue;

@@ -35,7 +35,9 @@ Eigen::Vector3d rms_shift(const std::vector<Stretch>& laps,
                           const SeriesOfChannels& series);
 
 /// Takes out of every lap what shifts make of it, any number of them: constant ones, and with
-/// `growing` such that grow during it, too.
+/// `growing` such that grow during it, too. They are fitted where all laps of a condition have
+/// readings, if those are most: what is no shift and the same in all laps (play, friction) is taken
+/// for the same shift then, and laps do not differ by it.
 enum class Shifts { constant, growing };
 void take_out_shifts(const std::vector<Stretch>& laps,
                      const std::vector<SeriesOfChannels>& per_shift, SeriesOfChannels& series,

@@ -44,7 +44,10 @@ TEST(Imitation, FrictionBesidePlayIsDryFriction) {
   const Diagnosis d = diagnose({run.record, replica, run.declared, some});
   EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
   EXPECT_EQ(d.effects.size(), 2U);
-  EXPECT_NEAR(number_of(d.found, "effects.X.backlash.gap_um"), 8, 0.1);
+  EXPECT_NEAR(number_of(d.found, "effects.X.backlash.gap_um"), 8, 0.2);
+  for (const FoundEffect& e : d.effects)
+    for (const FittedNumber& n : e.numbers)
+      EXPECT_TRUE(n.low < number_of(truth, n.key) && number_of(truth, n.key) < n.high) << n.key;
   EXPECT_NEAR(number_of(d.found, "effects.X.coulomb.level_N"), 40, 0.1);
 }
 

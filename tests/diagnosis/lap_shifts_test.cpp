@@ -49,6 +49,19 @@ TEST(LapShifts, AreFoundBesideShiftsThatGrow) {
     for (const double left : channel) EXPECT_NEAR(std::isfinite(left) ? left : 0, 0, 1e-11);
 }
 
+TEST(LapShifts, WhatIsNoShiftIsTheSameInAllLapsThoughOneHasNoBeginning) {
+  const std::vector<Stretch> of = laps(2, 200);
+  const std::vector<SeriesOfChannels> per_shift = ring(400, 200);
+  SeriesOfChannels readings(2, std::vector<double>(400));
+  for (std::size_t c = 0; c < 2; ++c)
+    for (std::size_t k = 0; k < 400; ++k)
+      readings[c][k] = (k % 200 < 100 ? 3e-6 : -3e-6) + (k < 200 ? 2e-6 : 0) * per_shift[0][c][k];
+  for (std::size_t k = 0; k < 30; ++k) readings[0][k] = readings[1][k] = kMissing;
+  take_out_shifts(of, per_shift, readings);
+  for (const std::vector<double>& channel : readings)
+    for (std::size_t k = 30; k < 200; ++k) EXPECT_NEAR(channel[k], channel[k + 200], 1e-12) << k;
+}
+
 TEST(LapShifts, ALapThatTellsLittleCountsLittle) {
   const std::vector<Stretch> of = laps(2, 200);
   std::vector<SeriesOfChannels> per_shift = ring(400, 200);
