@@ -33,6 +33,8 @@ constexpr double kKnownTogether = 0.2;
 constexpr double kFloorScatter = 0.04;
 /// Times the noise of a sample by which readings may shift from lap to lap.
 constexpr double kShifted = 3;
+/// Part of the readings that may count less without a word.
+constexpr double kSomeTurn = 0.005;
 /// Times what is declared that no declared number is.
 constexpr double kUnlikelyTimes = 4;
 const EffectText* text_of(const std::string& effect) {
@@ -98,6 +100,7 @@ class Report {
     tell_clamping();
     tell_noise_lines();
     tell_events();
+    tell_turning();
     std::vector<std::string> off = what_is_still_off();
     still_off_ = !off.empty();
     if (!selection_.interrupted) tell_law();
@@ -545,6 +548,16 @@ class Report {
           "{} does not do the same in all laps about {} s, as an axis that stops in its friction "
           "may, and in its first lap; these moments were left out.",
           kAxisNames[axis], at));
+  }
+
+  /// Readings that count less than the figures tell, which are of all alike.
+  void tell_turning() {
+    for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
+      if (const double share = evidence_.share_of_turning(c); share > kSomeTurn)
+        d_.notes.push_back(fmt::format(
+            "{}: {} of the readings count less, taken while what is off goes over from one state "
+            "to another; no signal of a drive tells when it should.",
+            channel_name(evidence_.replica().channels()[c]), percent(share)));
   }
 
   void flag_minor() {

@@ -441,6 +441,13 @@ Column Evidence::whiten(const SeriesOfChannels& change) const {
   return column;
 }
 
+double Evidence::share_of_turning(std::size_t channel) const {
+  double turns = 0, all = 0;
+  for (std::size_t k = 0; k < weight_[channel].size(); ++k)
+    if (valid_[channel][k]) all += 1, turns += weight_[channel][k] < kTurnsOver;
+  return all > 0 ? turns / all : 0;
+}
+
 double Evidence::count(std::size_t channel, Role role) const {
   return (role == Role::held_out ? 0 : fitted_count_[channel]) +
          (role == Role::fitted ? 0 : held_out_count_[channel]);

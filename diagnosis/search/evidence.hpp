@@ -102,6 +102,8 @@ class Evidence {
   /// W d for a change of the prediction given as such; an empty channel does not change.
   Column whiten(const SeriesOfChannels& change) const;
 
+  /// Part of the samples of a channel that say little, since something turns over there.
+  double share_of_turning(std::size_t channel) const;
   /// Samples of a channel that count.
   double count(std::size_t channel, Role role) const;
   double count(Role role) const;
