@@ -231,6 +231,15 @@ auto per_lane(F&& f) {
   (std::make_index_sequence<kLanesOf<Real>>());
 }
 
+/// The late truth of every cycle, whose others the drive need not know.
+template <class Real>
+std::vector<AxisReplay> replay_late(AxisDriveOf<Real> drive, std::size_t axis,
+                                    const PerLane<Real, AxisVariant>& variants,
+                                    const CommandedMotion& motion) {
+  drive.skip_early_truth(kTruthPerCycle - kLateTruth);
+  return replay_lanes<Real>(drive, axis, variants, motion, kLateTruth, nothing);
+}
+
 /// Fewer drives than this are stepped one after the other.
 constexpr std::size_t kWorthLanes = 3;
 
@@ -324,18 +333,17 @@ std::vector<AxisReplay> replay_variants(const std::vector<AxisVariant>& variants
     const std::vector<std::size_t>& group = groups[g];
     if (group.size() < kWorthLanes) {
       for (const std::size_t i : group)
-        replays[i] = replay_axis(variants[i].hypothesis, variants[i].actual, axis, motion);
+        replays[i] =
+            std::move(replay_late<double>(std::move(drives[i]), axis, {variants[i]}, motion)[0]);
       return;
     }
     std::vector<AxisDrive> together;
     for (const std::size_t i : group) together.push_back(std::move(drives[i]));
-    AxisDriveLanes drive(std::move(together));
-    drive.skip_early_truth(kTruthPerCycle - kLateTruth);
-    std::vector<AxisReplay> lanes =
-        replay_lanes<Lanes>(drive, axis, per_lane<Lanes>([&](std::size_t n) {
-                              return variants[group[std::min(n, group.size() - 1)]];
-                            }),
-                            motion, kLateTruth, nothing);
+    std::vector<AxisReplay> lanes = replay_late<Lanes>(
+        AxisDriveLanes(std::move(together)), axis, per_lane<Lanes>([&](std::size_t n) {
+          return variants[group[std::min(n, group.size() - 1)]];
+        }),
+        motion);
     for (std::size_t n = 0; n < group.size(); ++n) replays[group[n]] = std::move(lanes[n]);
   });
   return replays;

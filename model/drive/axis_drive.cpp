@@ -77,9 +77,11 @@ AxisDriveOf<Real>::AxisDriveOf(const AxisParams& declared, const AxisParams& act
       force_limit_(declared.mechanics.force_limit),
       setpoint_{actual.limits.start, 0.0},
       inertia_(declared.mechanics.total_inertia()),
-      plant_inertia_(actual.mechanics.total_inertia()),
       motor_inertia_(actual.mechanics.reflected_inertia()),
       load_inertia_(actual.mechanics.load),
+      plant_mobility_(kPlantTime / actual.mechanics.total_inertia()),
+      motor_mobility_(kPlantTime / motor_inertia_),
+      load_mobility_(kPlantTime / load_inertia_),
       laws_(!effects.laws.empty()),
       x_load_(actual.limits.start),
       x_motor_(actual.limits.start),
@@ -463,7 +465,7 @@ void AxisDriveOf<Real>::move_plant() {
 
 /// Velocity after friction has acted for one plant step.
 template <class Real>
-Real AxisDriveOf<Real>::rub(Real v, Real v_free, Real inertia) {
+Real AxisDriveOf<Real>::rub(Real v, Real v_free, Real mobility) {
   const bool one_mass = motor_rubs_ && !two_masses_;
   if (!rubbing_.some_active() && !one_mass) return v_free;
   FrictionPort::Signal<Real> terms;
@@ -478,7 +480,7 @@ Real AxisDriveOf<Real>::rub(Real v, Real v_free, Real inertia) {
     set_lane(terms.damping, i, signal.damping);
   });
   if (one_mass) terms.dry += motor_dry_, terms.viscous += motor_viscous_;
-  return friction_.step(terms, v, v_free, kPlantTime, inertia);
+  return friction_.step(terms, v, v_free, kPlantTime, mobility);
 }
 
 template <class Real>
@@ -487,13 +489,13 @@ Real AxisDriveOf<Real>::rub_motor(Real v_free) {
   FrictionPort::Signal<Real> terms;
   terms.dry = motor_dry_;
   terms.viscous = motor_viscous_;
-  return motor_friction_.step(terms, v_motor_, v_free, kPlantTime, motor_inertia_);
+  return motor_friction_.step(terms, v_motor_, v_free, kPlantTime, motor_mobility_);
 }
 
 template <class Real>
 void AxisDriveOf<Real>::move_rigid(Real force, Real load_force) {
   const Real v = v_load_;
-  v_load_ = rub(v, v + kPlantTime * (force + load_force) / plant_inertia_, plant_inertia_);
+  v_load_ = rub(v, v + plant_mobility_ * (force + load_force), plant_mobility_);
   x_load_ += 0.5 * kPlantTime * (v + v_load_);
   x_motor_ = x_load_;
   v_motor_ = v_load_;
@@ -508,9 +510,8 @@ void AxisDriveOf<Real>::move_two_masses(Real force, Real load_force) {
     spring = choose(
         taut, stiffness_ * (twist - copysign(half_gap_, twist)) + damping_ * (v_motor_ - v_load_),
         Real(0));
-  v_motor_ = rub_motor(v_motor_ + kPlantTime * (force - spring) / motor_inertia_);
-  v_load_ =
-      rub(v_load_, v_load_ + kPlantTime * (spring + load_force) / load_inertia_, load_inertia_);
+  v_motor_ = rub_motor(v_motor_ + motor_mobility_ * (force - spring));
+  v_load_ = rub(v_load_, v_load_ + load_mobility_ * (spring + load_force), load_mobility_);
   x_motor_ += kPlantTime * v_motor_;
   x_load_ += kPlantTime * v_load_;
 }

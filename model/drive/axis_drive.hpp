@@ -255,7 +255,7 @@ class AxisDriveOf {
   void move_plant();
   void move_rigid(Real force, Real load_force);
   void move_two_masses(Real force, Real load_force);
-  Real rub(Real v, Real v_free, Real inertia);
+  Real rub(Real v, Real v_free, Real mobility);
   Real rub_motor(Real v_free);
   Real displaced(Real velocity_before);
   /// How far the load is ahead of the motor by an uneven transmission, and what force the motor's
@@ -277,7 +277,8 @@ class AxisDriveOf {
 
   // Constants of the loops and the plant.
   Real inertia_;  ///< what the controller takes it to be
-  Real plant_inertia_, motor_inertia_, load_inertia_;
+  Real motor_inertia_, load_inertia_;
+  Real plant_mobility_, motor_mobility_, load_mobility_;  ///< plant step / inertia
   ServoPort::Signal<Real> servo_;
   Real kp_{}, lag_share_{}, position_share_{}, velocity_share_{};
   bool two_masses_ = false;
@@ -320,13 +321,13 @@ class AxisDriveOf {
 
   auto numbers() {
     return std::tuple_cat(
-        std::tie(setpoint_.position, setpoint_.velocity, inertia_, plant_inertia_, motor_inertia_,
-                 load_inertia_, servo_.kv, servo_.velocity_gain, servo_.integral_time,
-                 servo_.velocity_ff, servo_.acceleration_ff, servo_.current_lag, servo_.force_limit,
-                 kp_, lag_share_, position_share_, velocity_share_, stiffness_, damping_, half_gap_,
-                 wave_, wave_number_, wave_phase_, motor_dry_, motor_viscous_, x_load_, x_motor_,
-                 last_raw_.position, last_raw_.velocity, last_shaped_.position,
-                 last_shaped_.velocity),
+        std::tie(setpoint_.position, setpoint_.velocity, inertia_, motor_inertia_, load_inertia_,
+                 plant_mobility_, motor_mobility_, load_mobility_, servo_.kv, servo_.velocity_gain,
+                 servo_.integral_time, servo_.velocity_ff, servo_.acceleration_ff,
+                 servo_.current_lag, servo_.force_limit, kp_, lag_share_, position_share_,
+                 velocity_share_, stiffness_, damping_, half_gap_, wave_, wave_number_, wave_phase_,
+                 motor_dry_, motor_viscous_, x_load_, x_motor_, last_raw_.position,
+                 last_raw_.velocity, last_shaped_.position, last_shaped_.velocity),
         observer_.numbers());
   }
 };

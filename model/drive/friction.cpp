@@ -7,21 +7,20 @@ namespace vcnc {
 
 template <class Real>
 Real FrictionOf<Real>::step(const FrictionPort::Signal<Real>& terms, Real v, Real v_free, double dt,
-                            Real inertia) {
+                            Real mobility) {
   using std::abs, std::copysign, std::max;
-  const Real mobility = dt / inertia;
-  const auto dry_and_stiff = choose(terms.dry > Real(0), terms.stiffness, Real(0));
-  const auto bristly = dry_and_stiff > Real(0);
+  const auto stiffness = choose(terms.dry > Real(0), terms.stiffness, Real(0));
+  const auto bristly = stiffness > Real(0);
   Real v1{}, bristle{};
   if (any(bristly)) {
-    const Real shrink = 1.0 / (1.0 + terms.stiffness * abs(v) * dt / terms.dry);
-    const Real centre = terms.skew / terms.stiffness, bent = bristle_ - centre;
-    // F_f = at_rest + slope * v1
-    const Real at_rest =
-        bent * (terms.stiffness * shrink + terms.damping * (shrink - 1.0) / dt) + terms.skew;
-    const Real slope = (terms.stiffness * dt + terms.damping) * shrink + terms.viscous;
-    v1 = (v_free - mobility * at_rest) / (1.0 + mobility * slope);
-    bristle = (bent + dt * v1) * shrink + centre;
+    const Real speed = abs(v), slid = speed * dt;
+    const Real whole = terms.dry + stiffness * slid;
+    const Real freely = whole * (v_free - mobility * terms.skew);
+    const Real bent = stiffness * bristle_ - terms.skew;
+    const Real held = mobility * bent * (terms.dry - terms.damping * speed);
+    const Real slope = (stiffness * dt + terms.damping) * terms.dry;
+    v1 = (freely - held) / (whole * (1.0 + mobility * terms.viscous) + mobility * slope);
+    bristle = ((bristle_ + dt * v1) * terms.dry + terms.skew * slid) / whole;
   }
   if (!all(bristly)) {
     const Real level = terms.dry + copysign(Real(1), v_free) * terms.skew;
@@ -30,7 +29,8 @@ Real FrictionOf<Real>::step(const FrictionPort::Signal<Real>& terms, Real v, Rea
     bristle = choose(bristly, bristle, Real(0));
   }
   bristle_ = bristle;
-  force_ = (v_free - v1) / mobility;
+  taken_ = v_free - v1;
+  mobility_ = mobility;
   return v1;
 }
 

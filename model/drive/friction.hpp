@@ -15,8 +15,10 @@
 //   without  v1 = shrink(v_free, dt (g + sgn(v_free) w) / J) / (1 + dt B / J)
 //            v_free is the velocity without friction, shrink(v, d) = sgn(v) max(|v| - d, 0);
 //            it sticks exactly: v1 = 0 while |F - w| <= g
-//   with     u1 = (u0 + dt v1) / (1 + sigma0 |v0| dt / g), u = z - w / sigma0; F_f is then linear
-//            in v1 and solved for it
+//   with     z1 = ((z0 + dt v1) g + w |v0| dt) / D,  D = g + sigma0 |v0| dt;  F_f is then linear
+//            in v1 and solved for it, m = dt / J:
+//            v1 = (D (v_free - m w) - m (sigma0 z0 - w) (g - sigma1 |v0|))
+//                 / (D (1 + m B) + m (sigma0 dt + sigma1) g)
 //
 // Units: N, m, s or N m, rad, s. g is taken at the velocity v0 of the step's begin.
 // Source: Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419; Armstrong-Helouvry et
@@ -34,15 +36,17 @@ using FrictionTerms = FrictionPort::Signal<double>;
 template <class Real>
 class FrictionOf {
  public:
-  /// Velocity at the end of a step from `v`, when without friction it would be `v_free`.
-  Real step(const FrictionPort::Signal<Real>& terms, Real v, Real v_free, double dt, Real inertia);
+  /// Velocity at the end of a step of `dt` from `v`, when without friction it would be `v_free`;
+  /// mobility: dt / J.
+  Real step(const FrictionPort::Signal<Real>& terms, Real v, Real v_free, double dt, Real mobility);
 
   /// Friction force over the last step, positive against positive motion.
-  Real force() const { return force_; }
+  Real force() const { return taken_ / mobility_; }
 
  private:
-  Real bristle_{};  ///< z
-  Real force_{};
+  Real bristle_{};    ///< z
+  Real taken_{};      ///< velocity, over the last step
+  Real mobility_{1};  ///< in the last step
 };
 
 using Friction = FrictionOf<double>;

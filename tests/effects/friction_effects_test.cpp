@@ -144,7 +144,7 @@ class Slider {
     const double v_free = v_ + kPlantTime * force / kMass;
     FrictionTerms terms;
     chain_.step(terms, {{}, x_, v_, v_free});
-    v_ = friction_.step(terms, v_, v_free, kPlantTime, kMass);
+    v_ = friction_.step(terms, v_, v_free, kPlantTime, kPlantTime / kMass);
     x_ += kPlantTime * v_;
   }
   double position() const { return x_; }

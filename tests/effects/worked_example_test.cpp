@@ -52,7 +52,7 @@ TEST(WorkedExample, SwingsTheFrictionForceOverThePosition) {
       const double q = 1e-4 * i;
       FrictionTerms terms;
       chain.step(terms, {.moment = {}, .position = q, .velocity = v});
-      friction.step(terms, v, v, 50e-6, 500);
+      friction.step(terms, v, v, 50e-6, 50e-6 / 500);
       const double expected = 250 * (1 + 0.2 * std::cos(2 * kPi * q / 8e-3 + 0.5));
       EXPECT_NEAR(friction.force(), v > 0 ? expected : -expected, 1e-8);  // rounding of v
     }

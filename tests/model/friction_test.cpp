@@ -35,7 +35,7 @@ class Rubbing {
   double step(double v, double v_free, double dt, double inertia) {
     FrictionTerms terms;
     chain_.step(terms, {{}, 0, v, v_free});
-    return friction_.step(terms, v, v_free, dt, inertia);
+    return friction_.step(terms, v, v_free, dt, dt / inertia);
   }
   double force() const { return friction_.force(); }
 
@@ -68,8 +68,8 @@ TEST(Friction, SkewIsAForceOnceItHasSlid) {
   double bent = 0;  // least and most of the bristles' force
   for (int i = 0; i < 40000; ++i) {
     const auto velocity = [](int k) { return 2e-3 * std::sin(2 * kPi * k / 10000.0); };
-    a.step(even, velocity(i), velocity(i + 1), kDt, kHeavy);
-    b.step(skewed, velocity(i), velocity(i + 1), kDt, kHeavy);
+    a.step(even, velocity(i), velocity(i + 1), kDt, kDt / kHeavy);
+    b.step(skewed, velocity(i), velocity(i + 1), kDt, kDt / kHeavy);
     if (i < 4000) continue;
     EXPECT_NEAR(b.force() - a.force(), kSkew, 0.01) << i;
     bent = std::max(bent, std::abs(a.force()));
