@@ -653,14 +653,15 @@ class Report {
                      options_);
     // A law that does as well as all that was named takes the names away; it can explain all that
     // there is at most.
+    const Doubt of_alone = doubt_of(options_, selection_.base.rounding);
     Named named{selection_.base.held_out - found().held_out, found().added.size(),
                 std::numeric_limits<double>::infinity()};
+    if (named.count > 1) named.gain = counted(named.gain, base, now, of_alone);
     for (const AddedEffect& a : found().added) named.least = std::min(named.least, a.gain);
     if (anything && takes_names_away(named.gain + left, named, needed)) {
       LawFit instead = selection_.law_alone
                            ? *selection_.law_alone
-                           : best_law(evidence_, selection_.base,
-                                      doubt_of(options_, selection_.base.rounding), options_);
+                           : best_law(evidence_, selection_.base, of_alone, options_);
       if (instead.gain > 0.5 * (named.gain + std::max(0.0, law.gain)) &&
           takes_names_away(instead.gain, named, needed)) {
         std::string names;

@@ -40,7 +40,7 @@ inline constexpr std::size_t kImitation = 3;
 
 /// What effects with names explain.
 struct Named {
-  double gain;        ///< all together
+  double gain;        ///< all together, of several what counts of it (counted_gain.hpp)
   std::size_t count;  ///< effects
   double least;       ///< what the model loses without the one it misses least
 };
