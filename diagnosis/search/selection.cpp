@@ -23,8 +23,8 @@ constexpr double kAsGood = 0.99;          ///< part of a gain that is as much be
 constexpr std::size_t kAlternatives = 1;  ///< other beginnings
 constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to look for another one
 constexpr double kHalf = 0.5;  ///< of what is left: for a further effect than few, or another one
-/// Times what was to be explained that two effects of one drive make each and take back together.
-constexpr double kCancels = 9;
+/// Times what two effects of one place make together that each makes and the other takes back.
+constexpr double kCancels = 25;
 constexpr double kUnlikely = 3;          ///< pull of a declared number
 constexpr double kAtTheEnd = 2;          ///< times the least that a shape may be
 constexpr double kClearlySimpler = 0.5;  ///< numbers
@@ -282,22 +282,21 @@ class Search {
     return false;
   }
 
-  /// Whether two effects of one place are each far more than what was to be explained: what they
-  /// explain is what they differ by, and the rest is anybody's.
+  /// Whether two effects of one place each make far more than both together: what they explain is
+  /// what they differ by, and the rest is anybody's.
   bool cancels(const FittedMachine& m) const {
-    const double much =
-        kCancels * std::max(rules_.excess(result_.base.held_out), options_.least_gain);
-    const auto place = [&](const AddedEffect& a) { return candidates_[a.candidate].place; };
-    std::set<std::string> places;
-    for (std::size_t i = 0; i < m.added.size(); ++i) {
-      const bool alone = std::count_if(m.added.begin(), m.added.end(), [&](const AddedEffect& a) {
-                           return place(a) == place(m.added[i]);
-                         }) == 1;
-      if (alone) continue;
-      const FittedMachine less = taken_out(m, i, Common::held);
-      const double gain = evidence_.chi2(less.residual, Role::held_out) - m.held_out;
-      if (gain > much && !places.insert(place(m.added[i])).second) return true;
-    }
+    const auto lost = [&](const FittedMachine& less) {
+      return evidence_.chi2(less.residual, Role::held_out) - m.held_out;
+    };
+    for (std::size_t i = 0; i < m.added.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j) {
+        if (candidates_[m.added[i].candidate].place != candidates_[m.added[j].candidate].place)
+          continue;
+        const FittedMachine one = taken_out(m, i, Common::held);
+        const double both = lost(taken_out(one, j, Common::held));
+        const double much = kCancels * std::max(both, options_.least_gain);
+        if (lost(one) > much && lost(taken_out(m, j, Common::held)) > much) return true;
+      }
     return false;
   }
 
