@@ -282,8 +282,7 @@ class Search {
     return false;
   }
 
-  /// Whether two effects of one place each make far more than both together: what they explain is
-  /// what they differ by, and the rest is anybody's.
+  /// Whether two effects of one place take each other back.
   bool cancels(const FittedMachine& m) const {
     const auto lost = [&](const FittedMachine& less) {
       return evidence_.chi2(less.residual, Role::held_out) - m.held_out;
@@ -293,9 +292,8 @@ class Search {
         if (candidates_[m.added[i].candidate].place != candidates_[m.added[j].candidate].place)
           continue;
         const FittedMachine one = taken_out(m, i, Common::held);
-        const double both = lost(taken_out(one, j, Common::held));
-        const double much = kCancels * std::max(both, options_.least_gain);
-        if (lost(one) > much && lost(taken_out(m, j, Common::held)) > much) return true;
+        const double both = std::max(lost(taken_out(one, j, Common::held)), options_.least_gain);
+        if (take_each_other_back(lost(one), lost(taken_out(m, j, Common::held)), both)) return true;
       }
     return false;
   }
@@ -754,6 +752,10 @@ class Search {
 };
 
 }  // namespace
+
+bool take_each_other_back(double one, double other, double both) {
+  return std::min(one, other) > kCancels * both;
+}
 
 std::vector<double> noise_floor(const Evidence& evidence, const Column& residual,
                                 const std::vector<double>& form_of_channel) {

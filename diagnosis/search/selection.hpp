@@ -43,6 +43,10 @@
 
 namespace vcnc {
 
+/// Whether two effects that make `one` and `other` of chi-square, and `both` together, take each
+/// other back: what they explain is what they differ by, and the rest is anybody's.
+bool take_each_other_back(double one, double other, double both);
+
 struct DiagnosisProgress {
   std::string doing;  ///< "screening 212 candidates"
   double share = 0;   ///< of this step

@@ -74,6 +74,17 @@ TEST(GenericLaws, TakeANameAwayWhereTheyClearlyDoBetter) {
   EXPECT_FALSE(takes_names_away(164210, {164350, 3, 150}, 40));
 }
 
+TEST(Selection, TwoWavesOfOneLengthTakeEachOtherBack) {
+  // 169.8 N once in a turn and 168.8 N of a pole pitch that is hardly another, in antiphase, where
+  // a newton makes 15 of chi-square.
+  const double one = 15 * 169.8 * 169.8, other = 15 * 168.8 * 168.8;
+  EXPECT_TRUE(take_each_other_back(one, other, 1650));
+  // A stronger friction and a smaller viscous one that takes half of it back.
+  EXPECT_FALSE(take_each_other_back(4e4, 1e4, 1e4));
+  // One that counts for nothing beside another does not take it back.
+  EXPECT_FALSE(take_each_other_back(4e6, 100, 3.9e6));
+}
+
 TEST(FreeNumber, IsAtItsMostWithinAThousandthOfItsRange) {
   const FreeNumber lag{"axes.X.position_lag_us", 100, 0, 5000, true};
   EXPECT_TRUE(at_its_most(lag, 5000));
