@@ -468,17 +468,19 @@ template <class Real>
 Real AxisDriveOf<Real>::rub(Real v, Real v_free, Real mobility) {
   const bool one_mass = motor_rubs_ && !two_masses_;
   if (!rubbing_.some_active() && !one_mass) return v_free;
-  FrictionPort::Signal<Real> terms;
+  PerLane<Real, FrictionTerms> each{};
+  FrictionPort::Context<double> context{.moment =
+                                            moment(kPlantTime, kPlantStepsPerLoop, plant_step_)};
   rubbing_.each_active([&](Chain<FrictionPort>& chain, std::size_t i) {
-    FrictionTerms signal;
-    chain.step(signal, {moment(kPlantTime, kPlantStepsPerLoop, plant_step_), lane(x_load_, i),
-                        lane(v, i), lane(v_free, i)});
-    set_lane(terms.dry, i, signal.dry);
-    set_lane(terms.skew, i, signal.skew);
-    set_lane(terms.viscous, i, signal.viscous);
-    set_lane(terms.stiffness, i, signal.stiffness);
-    set_lane(terms.damping, i, signal.damping);
+    context.position = lane(x_load_, i);
+    context.velocity = lane(v, i);
+    context.free_velocity = lane(v_free, i);
+    chain.step(each[i], context);
   });
+  FrictionPort::Signal<Real> terms{
+      packed(each, &FrictionTerms::dry), packed(each, &FrictionTerms::skew),
+      packed(each, &FrictionTerms::viscous), packed(each, &FrictionTerms::stiffness),
+      packed(each, &FrictionTerms::damping)};
   if (one_mass) terms.dry += motor_dry_, terms.viscous += motor_viscous_;
   return friction_.step(terms, v, v_free, kPlantTime, mobility);
 }

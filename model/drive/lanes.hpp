@@ -43,6 +43,14 @@ class Lanes {
     for (Pair& p : part_) p = Pair{x, x};
   }
 
+  /// f(0), f(1), ...
+  template <class F>
+  static Lanes of(F&& f) {
+    Lanes r;
+    for (std::size_t i = 0; i < kPairs; ++i) r.part_[i] = Pair{f(2 * i), f(2 * i + 1)};
+    return r;
+  }
+
   double get(std::size_t lane) const { return part_[lane / 2][lane % 2]; }
   void set(std::size_t lane, double x) { part_[lane / 2][lane % 2] = x; }
 
@@ -132,5 +140,16 @@ inline void set_lane(Lanes& x, std::size_t i, double value) { x.set(i, value); }
 /// One of something per lane.
 template <class Real, class T>
 using PerLane = std::array<T, kLanesOf<Real>>;
+
+/// A number of each, as one: what was just written one by one is read one by one, since a pair of
+/// it would wait for both.
+template <class T>
+double packed(const PerLane<double, T>& each, double T::*number) {
+  return each[0].*number;
+}
+template <class T>
+Lanes packed(const PerLane<Lanes, T>& each, double T::*number) {
+  return Lanes::of([&](std::size_t i) { return each[i].*number; });
+}
 
 }  // namespace vcnc
