@@ -29,6 +29,8 @@ namespace {
 constexpr double kLoud = 1.5, kWrongOfFound = 0.05;
 /// Of an amplitude, what is uncertain of it with its shape known, where the shape is all the rest.
 constexpr double kKnownTogether = 0.2;
+/// Part of all that there was that many names may leave and be believed.
+constexpr double kImitated = 0.02;
 /// Part of the noise's chi-square that no law is sought in.
 constexpr double kFloorScatter = 0.04;
 /// Times the noise of a sample by which readings may shift from lap to lap.
@@ -658,20 +660,28 @@ class Report {
                 std::numeric_limits<double>::infinity()};
     if (named.count > 1) named.gain = counted(named.gain, base, now, of_alone);
     for (const AddedEffect& a : found().added) named.least = std::min(named.least, a.gain);
-    if (anything && takes_names_away(named.gain + left, named, needed)) {
+    // More names between two runs than machines change in, that leave something, imitate.
+    const bool imitate = found().found() > options_.few_effects && left > (kQuiet - 1) * floor_ &&
+                         left > kImitated * excess(selection_.base.held_out);
+    if (anything && (imitate || takes_names_away(named.gain + left, named, needed))) {
       LawFit instead = selection_.law_alone
                            ? *selection_.law_alone
                            : best_law(evidence_, selection_.base, of_alone, options_);
-      if (instead.gain > 0.5 * (named.gain + std::max(0.0, law.gain)) &&
-          takes_names_away(instead.gain, named, needed)) {
+      const bool does_it = instead.gain > 0.5 * (named.gain + std::max(0.0, law.gain)) &&
+                           takes_names_away(instead.gain, named, needed);
+      if (does_it || (imitate && instead.gain >= needed)) {
         std::string names;
         for (const AddedEffect& a : found().added)
           names += (names.empty() ? "" : " with ") + of_.candidates[a.candidate].name();
         for (const ReleasedNumber& r : found().released)
           names += (names.empty() ? "" : " with ") + r.key;
         d_.notes.push_back(
-            fmt::format("It looks like {}, but {} alone {}.", names, words_of(instead.law.law),
-                        instead.gain > named.gain ? "fits better" : "does the same"));
+            does_it ? fmt::format("It looks like {}, but {} alone {}.", names,
+                                  words_of(instead.law.law),
+                                  instead.gain > named.gain ? "fits better" : "does the same")
+                    : fmt::format("It looks like {}; so many changes at once that leave so much "
+                                  "imitate another one.",
+                                  names));
         std::erase_if(d_.effects, [](const FoundEffect& e) {
           return !e.place.empty() && e.place != "setup" && e.name != PeriodSlip::text.name;
         });
