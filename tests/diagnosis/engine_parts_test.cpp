@@ -75,8 +75,8 @@ TEST(GenericLaws, TakeANameAwayWhereTheyClearlyDoBetter) {
 }
 
 TEST(Selection, TwoWavesOfOneLengthTakeEachOtherBack) {
-  // 169.8 N once in a turn and 168.8 N of a pole pitch that is hardly another, in antiphase, where
-  // a newton makes 15 of chi-square.
+  // 169.8 N once in a turn and 168.8 N of a pole pitch that is hardly another, in antiphase; say
+  // that a newton makes 15 of chi-square.
   const double one = 15 * 169.8 * 169.8, other = 15 * 168.8 * 168.8;
   EXPECT_TRUE(take_each_other_back(one, other, 1650));
   // A stronger friction and a smaller viscous one that takes half of it back.
