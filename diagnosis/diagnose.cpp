@@ -7,6 +7,7 @@
 
 #include "diagnosis/findings.hpp"
 #include "diagnosis/records/signal_name.hpp"
+#include "diagnosis/replica/clipped_replica.hpp"
 #include "diagnosis/replica/model_comparison.hpp"
 #include "diagnosis/search/chatter_search.hpp"
 #include "diagnosis/search/common_numbers.hpp"
@@ -226,7 +227,8 @@ Diagnosis diagnose(const DiagnosisCase& of, const DifferentialRecord& difference
   DiagnosisOptions with_common = options;
   with_common.against = Against::healthy_run;
   with_common.common = common_numbers(difference.healthy);
-  ReplicaOfChange replica(of.replica, difference.healthy, with_common.common);
+  ClippedReplica reading(of.replica, difference.taken_off_of(of.replica.channels()));
+  ReplicaOfChange replica(reading, difference.healthy, with_common.common);
   // A change of such a number would be no change.
   std::vector<Candidate> candidates = of.candidates;
   std::erase_if(candidates, [&](const Candidate& c) {

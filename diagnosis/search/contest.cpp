@@ -254,7 +254,8 @@ std::vector<Contender> Contest::refitted(const std::vector<Screened>& list) cons
 double Contest::band_of(double gain) const {
   return rules_.options.class_gain +
          rules_.options.class_share * rules_.excess(ground_.held_out - gain) +
-         rules_.options.class_doubt * std::accumulate(doubt_.begin(), doubt_.end(), 0.0);
+         rules_.options.class_doubt *
+             std::min(std::max(0.0, gain), std::accumulate(doubt_.begin(), doubt_.end(), 0.0));
 }
 
 /// What was left out of a list though its promise is like the best gain.

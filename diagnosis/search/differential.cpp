@@ -318,6 +318,15 @@ double DifferentialRecord::off_in(const ComparedChannel& channel) const {
   return 0;
 }
 
+SeriesOfChannels DifferentialRecord::taken_off_of(
+    const std::vector<ComparedChannel>& channels) const {
+  SeriesOfChannels all(channels.size());
+  for (const auto& [of, series] : taken_off)
+    if (const auto c = std::find(channels.begin(), channels.end(), of); c != channels.end())
+      all[static_cast<std::size_t>(c - channels.begin())] = series;
+  return all;
+}
+
 std::vector<double> DifferentialRecord::noise_scales(
     const std::vector<ComparedChannel>& channels) const {
   if (noise_scale.empty()) return {};
@@ -362,6 +371,11 @@ DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
     if (!is_compared(signal.kind)) continue;
     if (signal.kind == SignalKind::position && is_followed(now, signal.axis)) continue;
     Difference difference = difference_of(now, signal, healthy, pairings);
+    if (is_reading(signal.kind)) {
+      std::vector<double> off(signal.value.size());
+      for (std::size_t k = 0; k < off.size(); ++k) off[k] = signal.value[k] - difference.value[k];
+      result.taken_off.emplace_back(ComparedChannel{signal.kind, signal.axis}, std::move(off));
+    }
     signal.value = std::move(difference.value);
     result.noise_scale.emplace_back(ComparedChannel{signal.kind, signal.axis},
                                     difference.noise_scale);

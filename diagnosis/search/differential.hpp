@@ -37,11 +37,15 @@ struct DifferentialRecord {
   /// RMS of what a signal is off yhat in the healthy run, of what may be otherwise another day:
   /// readings of the probe, and where a force is unknown what is left of it in the drive's signals.
   std::vector<std::pair<ComparedChannel, double>> off{};
+  /// What the healthy run is off its machine, as it was taken off each reading of the probe.
+  std::vector<std::pair<ComparedChannel, std::vector<double>>> taken_off{};
   HealthyNoise noise{};
   ForceOfAxes unknown{};  ///< as in the healthy run
   Machine healthy;        ///< what the record is held against instead of the declared machine
 
   double off_in(const ComparedChannel& channel) const;  ///< 0: nothing is known
+  /// `taken_off` of every channel; of those that are no readings empty.
+  SeriesOfChannels taken_off_of(const std::vector<ComparedChannel>& channels) const;
   /// Of every channel, as Evidence takes them; empty for no difference.
   std::vector<double> noise_scales(const std::vector<ComparedChannel>& channels) const;
 };

@@ -411,30 +411,38 @@ class Search {
   }
 
   /// What an effect of a drive does depends on the others that it has (play rattles where nothing
-  /// rubs): of axes at whose drive something was found, trials are simulated anew with that. And a
-  /// large effect hides the waves of a small one: shapes that only show now are tried as well.
+  /// rubs): of axes at whose drive something was found, trials are simulated anew with that, and
+  /// all of them where a probe was found to tell nothing for a while. And a large effect hides the
+  /// waves of a small one: shapes that only show now are tried as well.
   void look_again(const FittedMachine& now) {
     try_shapes_that_show(now);
     result_.trials = known_;
     const std::set<std::string> drives = drives_found(now, candidates_);
-    std::set<std::size_t> found;
-    for (const AddedEffect& a : now.added) found.insert(a.candidate);
+    std::set<std::size_t> found, blinding;
+    for (const AddedEffect& a : now.added) {
+      const std::string& effect = candidates_[a.candidate].effect;
+      const bool blinds = effect == RangeClip::text.name || effect == ContactLoss::text.name;
+      (blinds ? blinding : found).insert(a.candidate);
+    }
     std::vector<std::size_t> which;
     std::vector<Trial> again;
     for (std::size_t t = 0; t < known_.size(); ++t) {
       const Trial& trial = known_[t].trial;
       const Candidate& c = candidates_[trial.candidate];
-      if (!is_of_drive(c) || !drives.contains(c.place) || found.contains(trial.candidate)) continue;
+      const bool anew = blinding.empty() ? is_of_drive(c) && drives.contains(c.place) &&
+                                               !found.contains(trial.candidate)
+                                         : !blinding.contains(trial.candidate);
+      if (!anew) continue;
       which.push_back(t);
       again.push_back(trial);
     }
-    std::vector<TrialColumns> anew =
-        simulated_with(now, std::move(again), "simulating drives anew");
+    std::vector<TrialColumns> simulated =
+        simulated_with(now, std::move(again), "simulating with what was found");
     for (std::size_t i = 0; i < which.size(); ++i) {
       const TrialColumns& before = result_.trials[which[i]];
-      anew[i].detection_limit = before.detection_limit;
-      anew[i].later_than_linear = before.later_than_linear;
-      result_.trials[which[i]] = std::move(anew[i]);
+      simulated[i].detection_limit = before.detection_limit;
+      simulated[i].later_than_linear = before.later_than_linear;
+      result_.trials[which[i]] = std::move(simulated[i]);
     }
   }
 
