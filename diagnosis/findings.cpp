@@ -13,8 +13,8 @@
 #include "diagnosis/search/common_numbers.hpp"
 #include "diagnosis/search/consequence.hpp"
 #include "diagnosis/search/freed_number.hpp"
-#include "diagnosis/search/generic_laws.hpp"
 #include "diagnosis/search/intervals.hpp"
+#include "diagnosis/search/law_search.hpp"
 #include "diagnosis/search/screening.hpp"
 #include "diagnosis/search/trial.hpp"
 #include "diagnosis/verdict.hpp"
@@ -29,10 +29,6 @@ namespace {
 constexpr double kLoud = 1.5, kWrongOfFound = 0.05;
 /// Of an amplitude, what is uncertain of it with its shape known, where the shape is all the rest.
 constexpr double kKnownTogether = 0.2;
-/// Part of all that there was that many names may leave and be believed.
-constexpr double kImitated = 0.02;
-/// Part of the noise's chi-square that no law is sought in.
-constexpr double kFloorScatter = 0.04;
 /// Times the noise of a sample by which readings may shift from lap to lap.
 constexpr double kShifted = 3;
 /// Part of the readings that may count less without a word.
@@ -105,10 +101,10 @@ class Report {
     tell_turning();
     std::vector<std::string> off = what_is_still_off();
     still_off_ = !off.empty();
-    if (!selection_.interrupted) tell_law();
-    if (d_.law) off = what_is_still_off();
-    // Without the law, numbers were pulled for want of it.
-    if (!d_.law) d_.notes.insert(d_.notes.end(), pulled_.begin(), pulled_.end());
+    if (!selection_.interrupted) tell_laws();
+    if (!d_.laws.empty()) off = what_is_still_off();
+    // Without a law, numbers were pulled for want of it.
+    if (d_.laws.empty()) d_.notes.insert(d_.notes.end(), pulled_.begin(), pulled_.end());
     d_.notes.insert(d_.notes.end(), off.begin(), off.end());
     tell_chatter();
     tell_shifts_between_laps();
@@ -635,70 +631,25 @@ class Report {
     return off;
   }
 
-  void tell_law() {
-    if (!options_.suspects.empty()) return;
-    const double left = excess(found().held_out);
-    const bool quiet = !still_off_ && left < options_.law_gain + kFloorScatter * floor_;
-    if (quiet && found().added.empty()) return;
-    const double needed = std::max({options_.law_gain, options_.least_share * left,
-                                    options_.share_of_form * std::min(left, options_.form)});
-    const std::vector<double> base = evidence_.chi2_of(selection_.base.residual, Role::held_out),
-                              now = evidence_.chi2_of(found().residual, Role::held_out);
-    const bool anything = found().found() > 0;
-    // What leaves more than a model of the true cause may is believed no further than it explains.
-    const bool believed = anything && !still_off_;
-    LawFit law;
-    if (!quiet)
-      law = best_law(evidence_, found(),
-                     believed ? doubt_of(options_, found().explained(), base, now, found().rounding)
-                              : doubt_of(options_, found().rounding),
-                     options_);
-    // A law that does as well as all that was named takes the names away; it can explain all that
-    // there is at most.
-    const Doubt of_alone = doubt_of(options_, selection_.base.rounding);
-    Named named{selection_.base.held_out - found().held_out, found().added.size(),
-                std::numeric_limits<double>::infinity()};
-    if (named.count > 1) named.gain = counted(named.gain, base, now, of_alone);
-    for (const AddedEffect& a : found().added) named.least = std::min(named.least, a.gain);
-    // More names between two runs than machines change in, that leave something, imitate.
-    const bool imitate = found().found() > options_.few_effects && left > (kQuiet - 1) * floor_ &&
-                         left > kImitated * excess(selection_.base.held_out);
-    if (anything && (imitate || takes_names_away(named.gain + left, named, needed))) {
-      LawFit instead = selection_.law_alone
-                           ? *selection_.law_alone
-                           : best_law(evidence_, selection_.base, of_alone, options_);
-      const bool does_it = instead.gain > 0.5 * (named.gain + std::max(0.0, law.gain)) &&
-                           takes_names_away(instead.gain, named, needed);
-      if (does_it || (imitate && instead.gain >= needed)) {
-        std::string names;
-        for (const AddedEffect& a : found().added)
-          names += (names.empty() ? "" : " with ") + of_.candidates[a.candidate].name();
-        for (const ReleasedNumber& r : found().released)
-          names += (names.empty() ? "" : " with ") + r.key;
-        d_.notes.push_back(
-            does_it ? fmt::format("It looks like {}, but {} alone {}.", names,
-                                  words_of(instead.law.law),
-                                  instead.gain > named.gain ? "fits better" : "does the same")
-                    : fmt::format("It looks like {}; so many changes at once that leave so much "
-                                  "imitate another one.",
-                                  names));
-        std::erase_if(d_.effects, [](const FoundEffect& e) {
-          return !e.place.empty() && e.place != "setup" && e.name != PeriodSlip::text.name;
-        });
-        withdrawn_ = true;
-        law = std::move(instead);
-      }
+  void tell_laws() {
+    UnnamedLaws unnamed = search_laws(evidence_, selection_, of_.candidates, options_, still_off_);
+    if (unnamed.laws.empty()) return;
+    if (unnamed.instead) {
+      d_.notes.push_back(unnamed.note);
+      std::erase_if(d_.effects, [](const FoundEffect& e) {
+        return !e.place.empty() && e.place != "setup" && e.name != PeriodSlip::text.name;
+      });
+      withdrawn_ = true;
     }
-    if (law.gain < needed || (quiet && !withdrawn_)) return;
-    d_.law = law.law;
-    d_.found = law.machine;
-    // What is not told goes out of it, unless the law was learnt beside that.
-    Machine less = law.machine;
+    d_.laws = std::move(unnamed.laws);
+    d_.found = unnamed.machine;
+    // What is not told goes out of it, unless the laws were learnt beside that.
+    Machine less = std::move(unnamed.machine);
     for (const auto& [key, value] : put_back_) move_number(less, key, value);
     const auto held_out = [&](const Machine& m) {
       return evidence_.chi2(evidence_.residual(evidence_.predict(m)), Role::held_out);
     };
-    if (held_out(less) < held_out(law.machine) + options_.least_gain) d_.found = std::move(less);
+    if (held_out(less) < held_out(d_.found) + options_.least_gain) d_.found = std::move(less);
   }
 
   /// Of candidates, from those of the trials: the smallest size that is seen; of limits the
@@ -805,7 +756,7 @@ class Report {
     // A piece that lies elsewhere is no fault of the machine.
     const bool named = std::any_of(d_.effects.begin(), d_.effects.end(), is_of_machine);
     double ratio = 1 + after / std::max(1.0, floor_);
-    if (ratio >= kQuiet && !named && !still_off_ && !d_.law && d_.vibrations.empty()) {
+    if (ratio >= kQuiet && !named && !still_off_ && d_.laws.empty() && d_.vibrations.empty()) {
       const std::vector<double> made = made_by_steps();
       const double beyond = after - std::accumulate(made.begin(), made.end(), 0.0);
       if (beyond < (kQuiet - 1) * floor_) ratio = 1, tell_steps(made);
@@ -819,7 +770,7 @@ class Report {
         .excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),
                                [](const Excitation& e) { return e.excited; }),
         .named = named,
-        .law = d_.law.has_value(),
+        .law = !d_.laws.empty(),
         .vibrates = !d_.vibrations.empty(),
         .still_off = still_off_,
         .made_worse = made_worse_,

@@ -46,7 +46,7 @@ struct LearnedLaw {
   Law law;
   std::vector<double> low, high;  ///< band of its values
   double share = 0;               ///< of the remaining excess that it explains
-  std::string words;              ///< "behaves like force on X as sgn(v) f(x)"
+  std::string words;              ///< what it behaves like: "force on X as sgn(v_X) f(q_X)"
   std::vector<std::string> not_distinguishable_from;
 };
 
@@ -89,7 +89,7 @@ struct Diagnosis {
   double left = 0;  ///< RMS in units of the noise, of all signals; 0: no more than noise
   std::vector<FoundEffect> effects;     ///< by what they do to the contour error
   std::vector<FittedNumber> uncertain;  ///< what the declared machine calls so, as fitted along
-  std::optional<LearnedLaw> law;
+  std::vector<LearnedLaw> laws;         ///< each on what those before leave
   /// "X vibrates by itself at 83 Hz", "deflection x shifts by 1.2 um from lap to lap": of unknown
   /// cause.
   std::vector<std::string> vibrations;

@@ -59,7 +59,7 @@ Json rung(const Rung& r) {
   return {{"added", r.added}, {"chi2", finite(r.chi2)}, {"rms_si", rms}};
 }
 
-Json learned(const LearnedLaw& l) {
+Json learned_law(const LearnedLaw& l) {
   return {{"behaves_like", l.words},
           {"share", finite(l.share)},
           {"at", l.law.at},
@@ -91,7 +91,7 @@ std::string to_json(const Diagnosis& d, const std::string& source) {
                     {"noise", finite(d.chi2.noise)}}},
                   {"effects", list(d.effects, effect)},
                   {"uncertain", list(d.uncertain, number)},
-                  {"law", d.law ? learned(*d.law) : Json()},
+                  {"laws", list(d.laws, learned_law)},
                   {"vibrations", d.vibrations},
                   {"figures", list(d.figures, figure_json)},
                   {"ladder", list(d.ladder, rung)},

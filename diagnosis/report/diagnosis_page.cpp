@@ -220,6 +220,20 @@ std::string list_section(const char* title, const std::vector<std::string>& line
   return text + "</ul>\n";
 }
 
+std::string law_section(const LearnedLaw& law) {
+  std::string text =
+      "<h2>A law without a name</h2>\n<p>" + escaped(law_words({law})) +
+      fmt::format(", which takes {:.0f} % of what is otherwise left.</p>\n", 100 * law.share) +
+      figure(law_figure(law),
+             "f, as it was learned, with the band of 95 %: " + law_numbers(law) + ".");
+  if (law.not_distinguishable_from.empty()) return text;
+  text += "<p>This run cannot tell it from:";
+  for (const std::string& n : law.not_distinguishable_from)
+    text.append(" ").append(escaped(n)).append(";");
+  text.back() = '.';
+  return text + "</p>\n";
+}
+
 }  // namespace
 
 std::string diagnosis_page(const DiagnosisStory& story) {
@@ -246,20 +260,7 @@ std::string diagnosis_page(const DiagnosisStory& story) {
     for (const FoundEffect& e : d.effects) page += effect_box(e);
   }
   page += uncertain_section(d.uncertain);
-  if (d.law) {
-    page +=
-        "<h2>A law without a name</h2>\n<p>" + escaped(d.law->words) +
-        fmt::format(", which takes {:.0f} % of what is otherwise left.</p>\n", 100 * d.law->share) +
-        figure(law_figure(*d.law),
-               "f, as it was learned, with the band of 95 %: " + law_numbers(*d.law) + ".");
-    if (!d.law->not_distinguishable_from.empty()) {
-      page += "<p>This run cannot tell it from:";
-      for (const std::string& n : d.law->not_distinguishable_from)
-        page.append(" ").append(escaped(n)).append(";");
-      page.back() = '.';
-      page += "</p>\n";
-    }
-  }
+  for (const LearnedLaw& law : d.laws) page += law_section(law);
   const std::vector<std::size_t> shown = shown_channels(story.residuals);
   if (!shown.empty())
     page += "<h2>Measured less predicted</h2>\n" +

@@ -62,7 +62,7 @@ std::string verdict_sentence(const Diagnosis& d) {
                             percent(d.model_form_share))
               : "");
     case DiagnosisVerdict::unexplained:
-      if (d.law) return d.law->words;
+      if (!d.laws.empty()) return law_words(d.laws);
       if (!d.vibrations.empty()) return fmt::to_string(fmt::join(d.vibrations, ", "));
       return d.suspects.empty() ? "something is there that nothing in the library explains"
                                 : "something is there that no suspect explains";
@@ -125,8 +125,9 @@ std::string to_text(const Diagnosis& d) {
   }
   for (const FittedNumber& n : d.uncertain)
     text += fmt::format("  declared as uncertain: {} = {}\n", n.key, with_interval(n));
-  if (d.law && d.verdict != DiagnosisVerdict::unexplained) text += "  " + d.law->words + "\n";
-  if (d.law) text += "    " + law_numbers(*d.law) + "\n";
+  if (!d.laws.empty() && d.verdict != DiagnosisVerdict::unexplained)
+    text += "  " + law_words(d.laws) + "\n";
+  for (const LearnedLaw& law : d.laws) text += "    " + law_numbers(law) + "\n";
   text += figures_table(d.figures);
   std::size_t blind = 0;
   for (const Excitation& e : d.excitation) blind += !e.excited;

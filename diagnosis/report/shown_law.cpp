@@ -50,6 +50,13 @@ Shown shown_value(const Law& law) {
   return {y.name, y.unit + " per " + per.unit, y.factor / per.factor};
 }
 
+std::string law_words(const std::vector<LearnedLaw>& laws) {
+  std::string words;
+  for (const LearnedLaw& law : laws)
+    words += words.empty() ? "behaves like " + law.words : " and like " + law.words;
+  return words;
+}
+
 std::string law_numbers(const LearnedLaw& learned) {
   const Law& law = learned.law;
   if (law.value.empty()) return "";

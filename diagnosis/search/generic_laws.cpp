@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <memory>
+#include <numeric>
 #include <utility>
 
+#include "diagnosis/search/law_columns.hpp"
+#include "diagnosis/search/law_knots.hpp"
 #include "diagnosis/search/parallel.hpp"
 #include "diagnosis/search/screening.hpp"
 #include "model/axes.hpp"
@@ -14,8 +18,8 @@
 namespace vcnc {
 namespace {
 
-constexpr std::size_t kHats = 10;
-constexpr std::size_t kSimulated = 3;  // of the best laws by their columns
+constexpr std::size_t kRefined = 6, kSimulated = 3;  // of the best laws by their columns
+constexpr double kWorthAKnot = 0.02;                 // of what is left
 constexpr int kRounds = 4;
 constexpr std::size_t kAlternations = 4;
 constexpr double kNudge = 0.02, kWorthARound = 0.99;
@@ -23,325 +27,23 @@ constexpr double kNudge = 0.02, kWorthARound = 0.99;
 constexpr double kWrongAboutOne = 0.05;
 /// Part of what the least of many names does that a law need not do.
 constexpr double kOfTheLeast = 0.1;
-constexpr double kPulse = 2e-3;        // half width of the pulse [s]
-constexpr std::size_t kInstants = 64;  // at which a jump is sought first
-constexpr double kLongestJump = 5e-3;  // [s]
 
 using Series = std::vector<double>;
-
-/// Motion of an axis as commanded, by central differences.
-struct Course {
-  Series position, velocity, acceleration;
-};
-
-Course course_of(const Series& q, double period) {
-  Course c{q, Series(q.size(), 0.0), Series(q.size(), 0.0)};
-  for (std::size_t k = 1; k + 1 < q.size(); ++k) {
-    c.velocity[k] = (q[k + 1] - q[k - 1]) / (2 * period);
-    c.acceleration[k] = (q[k + 1] - 2 * q[k] + q[k - 1]) / (period * period);
-  }
-  return c;
-}
-
-/// How the channels answer at one axis.
-struct Response {
-  bool moves = false;
-  SeriesOfChannels displacement;     ///< change per metre (or radian) of displacement
-  std::vector<Series> force;         ///< impulse response per newton, per channel
-  std::vector<char> through_motion;  ///< the channel sees the axis through its position
-};
-
-class Laws {
- public:
-  Laws(const Evidence& evidence, const FittedMachine& at)
-      : evidence_(evidence), at_(at), period_(evidence.record().period) {
-    for (std::size_t i = 0; i < kAxisCount; ++i) {
-      const MeasuredSignal* command = evidence.record().find(SignalKind::command, i);
-      courses_.push_back(command ? course_of(command->value, period_) : Course{});
-      const auto faster = [](double v) { return std::abs(v) > 0.2e-3; };
-      moves_.push_back(
-          std::any_of(courses_[i].velocity.begin(), courses_[i].velocity.end(), faster));
-    }
-    responses_.resize(kAxisCount);
-    parallel_for(kAxisCount, [&](std::size_t i) {
-      if (moves_[i]) responses_[i] = response_of(i);
-    });
-  }
-
-  /// All laws that are tried, without values.
-  std::vector<Law> all() const {
-    std::vector<Law> laws;
-    using Point = Law::Point;
-    for (std::size_t i = 0; i < kAxisCount; ++i) {
-      if (!moves_[i]) continue;
-      const auto add = [&](Point point, Covariate over, std::size_t of, Covariate times) {
-        Law law;
-        law.axis = static_cast<Law::OfAxis>(i);
-        law.point = point;
-        law.over = over;
-        law.over_axis = static_cast<Law::OfAxis>(of);
-        law.times = times;
-        law.times_axis = static_cast<Law::OfAxis>(i);
-        law.at = knots(law);
-        if (law.at.size() == kHats) laws.push_back(law);
-      };
-      using enum Covariate;
-      for (const Point point : {Point::table_force, Point::displacement}) {
-        add(point, position, i, time);
-        add(point, position, i, sign);
-        add(point, velocity, i, time);
-        add(point, acceleration, i, time);
-        add(point, time, i, time);
-        add(point, time, i, sign);
-        add(point, time, i, position);
-      }
-      for (std::size_t j = 0; j < kAxisCount; ++j) {
-        if (j == i || !moves_[j]) continue;
-        for (const Covariate c : {position, velocity, acceleration})
-          add(Point::displacement, c, j, time);
-        for (const Covariate times : {time, sign}) add(Point::table_force, position, j, times);
-      }
-      if (!is_read(i)) continue;
-      for (std::size_t j = 0; j < kAxisCount; ++j)
-        if (moves_[j]) add(Point::reading, position, j, time);
-      add(Point::reading, time, i, time);
-    }
-    return laws;
-  }
-
-  /// Jumps in time, each where `gain` of it is largest: of the displacement of axes and of
-  /// readings.
-  template <class GainOf>
-  std::vector<Law> jumps(const GainOf& gain) const {
-    std::vector<Law> all;
-    for (std::size_t i = 0; i < kAxisCount; ++i) {
-      if (moves_[i]) all.push_back(jump(i, Law::Point::displacement, 1));
-      if (is_read(i)) all.push_back(jump(i, Law::Point::reading, 1));
-    }
-    parallel_for(all.size(), [&](std::size_t i) {
-      const auto at = [&](std::size_t sample) {
-        return jump(all[i].axis_index(), all[i].point, sample);
-      };
-      const std::size_t samples = evidence_.record().samples();
-      std::size_t step = samples / kInstants, best = 0;
-      double most = 0;
-      const auto take_if_better = [&](std::size_t sample) {
-        if (sample < 1 || sample + 1 >= samples) return;
-        if (const double g = gain(at(sample)); g > most) most = g, best = sample;
-      };
-      for (std::size_t k = 1; k < kInstants; ++k) take_if_better(k * step);
-      while (best > 0 && step > 1) {
-        step = (step + 1) / 2;
-        const std::size_t middle = best;
-        take_if_better(middle - std::min(step, middle));
-        take_if_better(middle + step);
-      }
-      all[i] = at(std::max<std::size_t>(1, best));
-    });
-    return all;
-  }
-
-  /// Whether the record has this component of the probe's reading.
-  bool is_read(std::size_t component) const {
-    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
-    return std::any_of(channels.begin(), channels.end(), [&](const ComparedChannel& c) {
-      return is_reading(c.kind) && c.axis == component;
-    });
-  }
-
-  std::vector<Column> columns(const Law& law) const {
-    std::vector<Column> all;
-    for (std::size_t h = 0; h < law.at.size(); ++h) {
-      Law hat = law;
-      hat.value.assign(law.at.size(), 0.0);
-      hat.value[h] = 1;
-      all.push_back(evidence_.whiten(change(hat)));
-    }
-    return all;
-  }
-
-  const Course& course(Law::OfAxis axis) const { return courses_[static_cast<std::size_t>(axis)]; }
-
- private:
-  double covariate(Covariate c, Law::OfAxis axis, std::size_t k) const {
-    const Course& of = course(axis);
-    switch (c) {
-      case Covariate::position:
-        return of.position[k];
-      case Covariate::velocity:
-        return of.velocity[k];
-      case Covariate::acceleration:
-        return of.acceleration[k];
-      case Covariate::sign:
-        return of.velocity[k] > 0 ? 1 : of.velocity[k] < 0 ? -1 : 0;
-      case Covariate::time:
-        break;
-    }
-    return static_cast<double>(k) * period_;
-  }
-
-  Series knots(const Law& law) const {
-    Series values;
-    for (const RecordBlock& block : evidence_.partition().blocks)
-      for (std::size_t k = block.begin; k < block.end; ++k)
-        if (const double v = covariate(law.over, law.over_axis, k); std::isfinite(v))
-          values.push_back(v);
-    if (values.size() < 100) return {};
-    // The outermost thousandth is left out: single peaks of the acceleration.
-    const auto quantile = [&](double share) {
-      const auto at = values.begin() +
-                      static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-      std::nth_element(values.begin(), at, values.end());
-      return *at;
-    };
-    const double low = quantile(0.001), high = quantile(0.999);
-    Series at;
-    if (!(high - low > 1e-9)) return at;
-    for (std::size_t h = 0; h < kHats; ++h)
-      at.push_back(low + (high - low) * static_cast<double>(h) / (kHats - 1));
-    return at;
-  }
-
-  /// A law without values that changes from one sample to this one, shortly before it where samples
-  /// are far from each other: it jumps (Law::jumps()).
-  Law jump(std::size_t axis, Law::Point point, std::size_t sample) const {
-    Law law;
-    law.axis = law.over_axis = law.times_axis = static_cast<Law::OfAxis>(axis);
-    law.point = point;
-    const double time = static_cast<double>(sample) * period_;
-    law.at = {time - std::min(period_, kLongestJump), time};
-    return law;
-  }
-
-  Law pulse(std::size_t axis, double at, double size) const {
-    Law law;
-    law.axis = static_cast<Law::OfAxis>(axis);
-    law.point = Law::Point::table_force;
-    law.at = {at - kPulse, at, at + kPulse};
-    law.value = {0, size, 0};
-    return law;
-  }
-
-  Response response_of(std::size_t i) const {
-    Response r;
-    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
-    Law constant;
-    constant.axis = static_cast<Law::OfAxis>(i);
-    constant.point = Law::Point::displacement;
-    const double shift = is_rotary(i) ? 1e-6 : 1e-6;
-    constant.at = {0, 1};
-    constant.value = {shift, shift};
-    r.displacement = difference(constant, 1 / shift);
-
-    // A pulse where the axis moves fastest, so that friction does not hold it.
-    const Series& v = courses_[i].velocity;
-    std::size_t fastest = 0;
-    for (std::size_t k = 0; k < v.size(); ++k)
-      if (std::abs(v[k]) > std::abs(v[fastest])) fastest = k;
-    const double time = static_cast<double>(fastest) * period_;
-    const double size = is_rotary(i) ? 1 : 50;
-    const SeriesOfChannels answer = difference(pulse(i, time, size), period_ / (size * kPulse));
-    const auto length = static_cast<std::size_t>(std::round(0.3 / period_));
-    const auto lead = static_cast<std::size_t>(std::round(kPulse / period_));
-    for (std::size_t c = 0; c < channels.size(); ++c) {
-      r.through_motion.push_back(is_reading(channels[c].kind));
-      Series h;
-      const bool own = channels[c].axis == i && !is_reading(channels[c].kind);
-      for (std::size_t k = 0; own && k < length && fastest + k < v.size() + lead; ++k) {
-        if (fastest + k < lead) continue;
-        h.push_back(answer[c][fastest + k - lead]);
-      }
-      r.force.push_back(std::move(h));
-    }
-    return r;
-  }
-
-  SeriesOfChannels difference(const Law& law, double scale) const {
-    Machine machine = at_.machine;
-    machine.effects.laws.push_back(law);
-    const Prediction p = evidence_.predict(machine);
-    SeriesOfChannels d;
-    for (std::size_t c = 0; c < p.size(); ++c) {
-      d.emplace_back(p[c].size());
-      for (std::size_t k = 0; k < p[c].size(); ++k)
-        d[c][k] = (p[c][k] - at_.prediction[c][k]) * scale;
-    }
-    return d;
-  }
-
-  /// y of a law at every sample.
-  Series strength(const Law& law) const {
-    Series y(evidence_.record().samples());
-    for (std::size_t k = 0; k < y.size(); ++k) {
-      const double m = law.times == Covariate::time ? 1 : covariate(law.times, law.times_axis, k);
-      y[k] = m * law.function(covariate(law.over, law.over_axis, k));
-      if (!std::isfinite(y[k])) y[k] = 0;
-    }
-    return y;
-  }
-
-  static Series convolved(const Series& y, const Series& h, std::size_t lead) {
-    Series out(y.size(), 0.0);
-    for (std::size_t k = 0; k < y.size(); ++k) {
-      if (y[k] == 0) continue;
-      for (std::size_t j = 0; j < h.size() && k + j < y.size() + lead; ++j)
-        if (k + j >= lead) out[k + j - lead] += y[k] * h[j];
-    }
-    return out;
-  }
-
-  /// What a law changes; channels that it does not change are empty.
-  SeriesOfChannels change(const Law& law) const {
-    const Response& r = responses_[law.axis_index()];
-    const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
-    const Series y = strength(law);
-    SeriesOfChannels p(channels.size());
-    if (law.point == Law::Point::reading) {
-      for (std::size_t c = 0; c < channels.size(); ++c)
-        if (is_reading(channels[c].kind) && channels[c].axis == law.axis_index()) p[c] = y;
-      return p;
-    }
-    Series motion = y;
-    if (law.point == Law::Point::table_force) {
-      const auto lead = static_cast<std::size_t>(std::round(kPulse / period_));
-      motion.assign(y.size(), 0.0);
-      for (std::size_t c = 0; c < channels.size(); ++c) {
-        if (r.force[c].empty()) continue;
-        p[c] = convolved(y, r.force[c], lead);
-        if (channels[c].kind == SignalKind::position) motion = p[c];
-      }
-    }
-    for (std::size_t c = 0; c < channels.size(); ++c) {
-      if (!r.through_motion[c]) continue;
-      p[c].resize(y.size());
-      for (std::size_t k = 0; k < y.size(); ++k) p[c][k] = r.displacement[c][k] * motion[k];
-    }
-    return p;
-  }
-
-  const Evidence& evidence_;
-  const FittedMachine& at_;
-  double period_;
-  std::vector<Course> courses_;
-  std::vector<char> moves_;
-  std::vector<Response> responses_;
-};
 
 struct LinearLaw {
   double gain = 0;
   Eigen::VectorXd value, sigma;
 };
 
-LinearLaw fit(const Evidence& evidence, const Ground& ground, const std::vector<Column>& columns) {
-  std::vector<const Column*> own;
-  for (const Column& c : columns) own.push_back(&c);
-  const RoleGrams across = evidence.cross(ground.columns, own), among = evidence.cross(own, own);
+/// `across`: products of [residual, linear numbers] with a law's columns; `among`: of these.
+LinearLaw fit(const Ground& ground, const RoleGrams& across, const RoleGrams& among) {
   const Eigen::Index n = ground.precision.size(), k = among.fitted.rows();
   Eigen::VectorXd precision = Eigen::VectorXd::Zero(n + k), offset = Eigen::VectorXd::Zero(n + k);
   precision.head(n) = ground.precision;
   offset.head(n) = ground.offset;
   precision.tail(k).setConstant(1e-4 * among.fitted.diagonal().mean());
-  const RoleGrams all = bordered(ground.grams, across, among);
+  const RoleGrams all =
+      bordered({ground.grams.fitted, ground.grams.held_out, {}, {}}, across, among);
   const LinearStep s = linear_step(all.fitted, all.held_out, precision, offset);
   Eigen::MatrixXd a = all.fitted.bottomRightCorner(n + k, n + k);
   a.diagonal() += precision;
@@ -353,6 +55,78 @@ LinearLaw fit(const Evidence& evidence, const Ground& ground, const std::vector<
   law.gain = ground.held_out - (s.held_out - ridge);
   return law;
 }
+
+LinearLaw fit(const Evidence& evidence, const Ground& ground, const std::vector<Column>& columns) {
+  std::vector<const Column*> own;
+  for (const Column& c : columns) own.push_back(&c);
+  return fit(ground, evidence.cross(ground.columns, own), evidence.cross(own, own));
+}
+
+/// What a law would gain with narrower hats besides its own; columns and products are computed
+/// once.
+class GainWithHats {
+ public:
+  GainWithHats(const Evidence& evidence, const Ground& ground, const LawColumns& columns,
+               const Law& law)
+      : evidence_(evidence), ground_(ground), of_(columns), law_(law) {
+    take(of_.columns(law));
+  }
+
+  double operator()(const std::vector<Hat>& hats) {
+    std::vector<Eigen::Index> chosen(law_.at.size());
+    std::iota(chosen.begin(), chosen.end(), 0);
+    learn(hats);
+    for (const Hat& h : hats)
+      chosen.push_back(static_cast<Eigen::Index>(law_.at.size()) +
+                       (std::find(hats_.begin(), hats_.end(), h) - hats_.begin()));
+    const auto some = [&](const RoleGrams& of, const auto& rows) {
+      return RoleGrams{of.fitted(rows, chosen), of.held_out(rows, chosen), {}, {}};
+    };
+    std::vector<Eigen::Index> all(static_cast<std::size_t>(across_.fitted.rows()));
+    std::iota(all.begin(), all.end(), 0);
+    return fit(ground_, some(across_, all), some(among_, chosen)).gain;
+  }
+
+ private:
+  /// Hats that were not asked for before.
+  void learn(const std::vector<Hat>& hats) {
+    std::vector<Law> fresh;
+    for (const Hat& h : hats) {
+      if (std::find(hats_.begin(), hats_.end(), h) != hats_.end()) continue;
+      hats_.push_back(h);
+      fresh.push_back(law_);
+      fresh.back().at = {h.low, h.at, h.high};
+      fresh.back().value = {0, 1, 0};
+    }
+    std::vector<Column> columns(fresh.size());
+    parallel_for(fresh.size(), [&](std::size_t i) { columns[i] = of_.column(fresh[i]); });
+    if (!columns.empty()) take(std::move(columns));
+  }
+
+  void take(std::vector<Column> fresh) {
+    std::vector<const Column*> known, own;
+    for (const Column& c : columns_) known.push_back(&c);
+    for (Column& c : fresh) columns_.push_back(std::move(c));
+    for (std::size_t i = known.size(); i < columns_.size(); ++i) own.push_back(&columns_[i]);
+    const RoleGrams across = evidence_.cross(ground_.columns, own),
+                    among = evidence_.cross(own, own);
+    if (known.empty()) {
+      across_ = across;
+      among_ = among;
+      return;
+    }
+    among_ = bordered(among_, evidence_.cross(known, own), among);
+    across_ = beside(across_, across);
+  }
+
+  const Evidence& evidence_;
+  const Ground& ground_;
+  const LawColumns& of_;
+  Law law_;
+  std::vector<Hat> hats_;
+  std::deque<Column> columns_;  // of the law's own knots, then of the hats
+  RoleGrams across_, among_;
+};
 
 /// A machine by hypothesis and what it leaves of chi-square on the fitted laps.
 struct Settled {
@@ -438,6 +212,16 @@ Eigen::VectorXd refine(const Evidence& evidence, const Machine& without, const L
 
 }  // namespace
 
+FittedMachine learned(const Evidence& evidence, const FittedMachine& at, const Machine& machine) {
+  FittedMachine now = at;
+  now.machine = machine;
+  for (AddedEffect& a : now.added)
+    for (FreedNumber& n : a.numbers) n.value = number_of(machine, n.number.key);
+  for (FreedNumber& n : now.nuisances.numbers) n.value = number_of(machine, n.number.key);
+  converge_anew(evidence, now);
+  return now;
+}
+
 bool takes_names_away(double alone, const Named& named, double needed) {
   if (named.count <= 1) return alone > named.gain + needed + kWrongAboutOne * named.gain;
   return alone > named.gain - (named.count >= kImitation ? kOfTheLeast * named.least : 0);
@@ -467,7 +251,7 @@ std::string words_of(const Law& law) {
 
 LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& doubt,
                 const DiagnosisOptions& options) {
-  const Laws laws(evidence, at);
+  const LawColumns laws(evidence, at);
   const LinearPart linear = at.linear();
   const Ground ground(evidence, at.residual, linear);
   const auto fitted = [&](const Law& law) { return fit(evidence, ground, laws.columns(law)); };
@@ -481,9 +265,20 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
   best.machine = at.machine;
   const double excess = std::max(1.0, ground.held_out - evidence.count(Role::held_out));
   std::vector<std::size_t> order(all.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t x, std::size_t y) { return fits[x].gain > fits[y].gain; });
+  std::iota(order.begin(), order.end(), 0);
+  const auto by_gain = [&](std::size_t x, std::size_t y) { return fits[x].gain > fits[y].gain; };
+  std::stable_sort(order.begin(), order.end(), by_gain);
+  for (std::size_t rank = 0; rank < std::min(kRefined, order.size()); ++rank) {
+    Law& law = all[order[rank]];
+    LinearLaw& f = fits[order[rank]];
+    // Over time a law is slow, or jumps: what is another in one lap is none.
+    if (f.gain < options.law_gain || law.over == Covariate::time) continue;
+    GainWithHats gain(evidence, ground, laws, law);
+    const double worth = std::max(options.law_gain, kWorthAKnot * (excess - f.gain));
+    law.at = with_more_knots(law.at, std::ref(gain), worth);
+    f = fitted(law);
+  }
+  std::stable_sort(order.begin(), order.end(), by_gain);
   // The columns are a linearisation; the first few are asked what they do in the loop.
   const auto counted_of = [&](const Acting& law) {
     return counted(ground.held_out - law.ground.held_out, ground.held_out_of,
@@ -523,35 +318,36 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
     without = std::move(moved);
     if (now > kWorthARound * before) break;
   }
-  Law& law = best.law.law = acting->law;
+  LearnedLaw& told = best.laws.emplace_back();
+  Law& law = told.law = acting->law;
   law.label = "learned: " + words_of(law);
   for (std::size_t h = 0; h < law.value.size(); ++h) {
     const double band = 1.96 * sigma[static_cast<Eigen::Index>(h)];
-    best.law.low.push_back(law.value[h] - band);
-    best.law.high.push_back(law.value[h] + band);
+    told.low.push_back(law.value[h] - band);
+    told.high.push_back(law.value[h] + band);
   }
   best.gain = counted_of(*acting);
-  best.law.words = "behaves like " + words_of(law);
-  best.law.share = std::min(1.0, best.gain / excess);
+  told.words = words_of(law);
+  told.share = std::min(1.0, best.gain / excess);
   // What that leaves is told in the loop: numbers moved along their columns may disappoint there.
-  FittedMachine learned = without;
-  learned.machine = acting->machine;
-  converge(evidence, learned);
-  best.machine = evidence.chi2(learned.residual, Role::fitted) < acting->settled.fitted
-                     ? learned.machine
+  FittedMachine moved = without;
+  moved.machine = acting->machine;
+  converge(evidence, moved);
+  best.machine = evidence.chi2(moved.residual, Role::fitted) < acting->settled.fitted
+                     ? moved.machine
                      : acting->settled.machine;
   best.machine.effects.laws.back() = law;  // with its label
   if (evidence.chi2(evidence.residual(evidence.predict(best.machine)), Role::held_out) >=
       evidence.chi2(at.residual, Role::held_out)) {
-    best.gain = 0;
-    best.machine = at.machine;
-    return best;
+    LawFit none;
+    none.machine = at.machine;
+    return none;
   }
   const double band = options.class_gain + options.class_share * excess;
   for (const std::size_t i : order)
-    if (fits[i].gain > fits[order.front()].gain - band &&
-        words_of(all[i]) != words_of(best.law.law) && best.law.not_distinguishable_from.size() < 5)
-      best.law.not_distinguishable_from.push_back(words_of(all[i]));
+    if (fits[i].gain > fits[order.front()].gain - band && words_of(all[i]) != words_of(told.law) &&
+        told.not_distinguishable_from.size() < 5)
+      told.not_distinguishable_from.push_back(words_of(all[i]));
   return best;
 }
 

@@ -1,17 +1,16 @@
 // Laws without a name: what is left over as a function of something, through the closed loop.
 //
-//   y = m f(c),   f = sum of 10 hat functions over the range of the covariate c, with a small ridge
+//   y = m f(c),   f = sum of hat functions over the range of the covariate c, with a small ridge
 //   y = a before an instant, b after it: what slips, once
 //
 // at a point of an axis (model/effects/law.hpp): force on the table, displacement of the tool
-// centre, reading of the probe. m is 1, a sign of the velocity or a position. To first order the
-// closed loop answers a force by a convolution and a displacement at once, so that one pulse and
-// one constant law per axis, simulated, give the columns of every law. The best few laws are then
-// simulated themselves and the best of these is fitted again where it acts (Gauss-Newton); what it
-// gains there on the held-out laps counts.
+// centre, reading of the probe. m is 1, a sign of the velocity or a position. All are fitted to
+// first order (law_columns.hpp) with ten hats each; the best ones that are no laws of time get more
+// where held-out laps ask for them (law_knots.hpp). The best few are then simulated themselves and
+// the best of these is fitted again where it acts (Gauss-Newton); what it gains there on the
+// held-out laps counts.
 //
-// Known limits: a law that only acts while an axis sticks is not linear; laws that differ by less
-// than the equivalence band (30 and 5 %) are told as such.
+// Known limit: laws that differ by less than the equivalence band (30 and 5 %) are told as such.
 #pragma once
 
 #include <string>
@@ -25,15 +24,18 @@
 namespace vcnc {
 
 struct LawFit {
-  LearnedLaw law;
+  std::vector<LearnedLaw> laws;
   double gain = 0;  ///< held-out chi-square, simulated
-  Machine machine;  ///< with the law
+  Machine machine;  ///< with the laws
 };
 
 /// The best law on what `at` leaves, or one with gain 0.
 /// `doubt`: of gains, see counted_gain.hpp.
 LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& doubt,
                 const DiagnosisOptions& options);
+
+/// `at` as it stands with laws that were learnt on what it leaves, all its numbers fitted again.
+FittedMachine learned(const Evidence& evidence, const FittedMachine& at, const Machine& machine);
 
 /// Names that are too many where one law does as well.
 inline constexpr std::size_t kImitation = 3;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kEvent = 40, kFaded = 4;  // times what laps usually differ by
 constexpr double kClip = 8;                // of the same, not usual any more
-constexpr double kMost = 0.02;             // of all samples
+constexpr double kMostSamples = 0.02;      // of all samples
 constexpr double kMostOfOneLap = 0.1;      // of the same, where the other laps agree
 constexpr double kEventReach = 0.05;       // [s]
 constexpr int kClippings = 10;
@@ -130,7 +130,7 @@ std::vector<LapEvent> events_of_all(const ComparedChannel& channel,
       for (const Stretch& lap : r.laps) all.push_back(event(channel, lap, begin, end));
     }
   }
-  if (within > kMost * samples) all.clear();
+  if (within > kMostSamples * samples) all.clear();
   return all;
 }
 

@@ -91,9 +91,10 @@ def diagnose(vcnc, answer, arguments, out):
         return {"kind": answer["kind"], "truth": [grading.label(e) for e in answer["effects"]] or [answer.get("unknown", "")],
                 "number": answer.get("number"), "failed": str(error)}
     report = json.loads((out / "diagnosis.json").read_text())
-    if report.get("law"):
-        laws = tomllib.loads((out / MODEL).read_text()).get("effects", {}).get("law", [])
-        report["law"].update(next((l for l in laws if l.get("label", "").startswith("learned")), {}))
+    if report["laws"]:
+        laws = tomllib.loads((out / MODEL).read_text())["effects"]["law"]
+        for told, law in zip(report["laws"], (l for l in laws if l.get("label", "").startswith("learned"))):
+            told.update(law)
     row = grading.grade(answer, report, seconds)
     if row.get("top") or row["kind"] == "without":
         # An effect that was left out of the library is there for who knows it.

@@ -189,7 +189,7 @@ TEST(CommonNumbers, KeepAFaultFromBeingToldTwice) {
   ASSERT_EQ(d.effects.size(), 1U);
   EXPECT_EQ(d.effects[0].name, "squareness");
   EXPECT_NEAR(d.effects[0].numbers[0].value, 500, 1);
-  EXPECT_EQ(d.law, std::nullopt);
+  EXPECT_TRUE(d.laws.empty());
   EXPECT_EQ(d.found.probe.damping_ratio, declared.probe.damping_ratio);
 }
 

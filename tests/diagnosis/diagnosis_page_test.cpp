@@ -69,7 +69,7 @@ TEST(DiagnosisJson, HoldsAllThatWasFoundInTheUnitsOfItsNames) {
   EXPECT_FALSE(json["excitation"][1].contains("detection_limit_beside_found"));  // nothing found
   EXPECT_TRUE(json["excitation"][1]["detection_limit"].is_null());               // infinite
   EXPECT_EQ(json["ladder"][1]["chi2"], 1200);
-  EXPECT_TRUE(json["law"].is_null());
+  EXPECT_TRUE(json["laws"].empty());
 }
 
 TEST(DiagnosisText, BeginsWithTheVerdictAndHasNumbersWithIntervals) {
@@ -167,9 +167,9 @@ TEST(ExplainedBy, FindsWhatAResidualGoesAlongWith) {
 TEST(DiagnosisPage, TellsTheStoryInPicturesAndIsSelfContained) {
   const Record record = swinging();
   Diagnosis d = found_backlash();
-  d.law.emplace();
-  d.law->law.over = Covariate::velocity;
-  d.law->law.at = d.law->low = d.law->high = d.law->law.value = {0, 1};
+  d.laws.emplace_back();
+  d.laws[0].law.over = Covariate::velocity;
+  d.laws[0].law.at = d.laws[0].low = d.laws[0].high = d.laws[0].law.value = {0, 1};
   ModelResiduals residuals;
   residuals.channels = {{SignalKind::position, kX}};
   residuals.before.emplace_back();

@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "diagnosis/search/contest.hpp"
-#include "diagnosis/search/generic_laws.hpp"
 #include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/least_squares.hpp"
 #include "diagnosis/search/noise_audit.hpp"
@@ -56,22 +55,6 @@ TEST(NoiseAudit, TellsFrequencyAndAmplitudeOfWhatDoesNotRepeat) {
   toy::measure(quiet, Machine(), 6);
   toy::ToyReplica of_quiet(quiet);
   EXPECT_TRUE(Evidence(quiet, of_quiet, Machine()).noise().lines.empty());
-}
-
-TEST(GenericLaws, TakeANameAwayWhereTheyClearlyDoBetter) {
-  // Friction that differs with the direction, of which the model is wrong by 1.4 %.
-  EXPECT_FALSE(takes_names_away(20600, {20310, 1, 20310}, 71));
-  // What no effect does: the best one imitates a third of it.
-  EXPECT_TRUE(takes_names_away(268900, {101200, 1, 101200}, 16700));
-  // Where little is to be gained, what a law is to gain at all decides.
-  EXPECT_FALSE(takes_names_away(160, {100, 1, 100}, 60));
-  EXPECT_TRUE(takes_names_away(170, {100, 1, 100}, 60));
-  EXPECT_TRUE(takes_names_away(184300, {184200, 2, 9000}, 9300));
-  EXPECT_FALSE(takes_names_away(184100, {184200, 2, 9000}, 9300));
-  // Three names for a bellows at the end of a travel.
-  EXPECT_TRUE(takes_names_away(164210, {164350, 3, 7740}, 40));
-  // A small effect that the law does not do.
-  EXPECT_FALSE(takes_names_away(164210, {164350, 3, 150}, 40));
 }
 
 TEST(Selection, TwoWavesOfOneLengthTakeEachOtherBack) {

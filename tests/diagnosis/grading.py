@@ -161,7 +161,7 @@ def grade(answer, report, seconds):
     told = claims(report)
     row = {"kind": answer["kind"], "truth": [label(e) for e in answer["effects"]] or [answer.get("unknown", "")],
            "told": [label(e) for e in told], "verdict": report["verdict"], "seconds": seconds,
-           "law": (report.get("law") or {}).get("behaves_like", ""), "number": answer.get("number"),
+           "law": " and like ".join(law["behaves_like"] for law in report["laws"]), "number": answer.get("number"),
            "claims": len(told)}
     effects = answer["effects"]
     if answer.get("without"):
@@ -202,7 +202,7 @@ def grade(answer, report, seconds):
                         row["errors"].append(abs(number["value"] - true) / scale)
                     row["covered"].append(within(true, number["low"], number["high"]))
     if row["kind"] in ("unknown", "without"):
-        law = report.get("law") or {}
+        law = report["laws"][0] if report["laws"] else {}
         row["rejected"] = report["verdict"].startswith(OPEN)
         row["law_right"] = bool(law) and law.get("axis") in answer["law_axes"] and law.get("point") in answer["law_points"]
     ratios = []

@@ -15,7 +15,7 @@ TRUTH = {"kind": "single", "number": 3, "effects": [{"name": "backlash", "place"
 
 
 def report(*effects, verdict="EXPLAINED", left=(9.0, 1.0, 1.0), **more):
-    return {"verdict": verdict, "effects": list(effects), "chi2_held_out": dict(zip(("before", "after", "noise"), left)), **more}
+    return {"verdict": verdict, "effects": list(effects), "laws": [], "chi2_held_out": dict(zip(("before", "after", "noise"), left)), **more}
 
 
 def found(name, axis, key="", value=0.0, low=0.0, high=0.0, **more):
@@ -175,7 +175,7 @@ class Grading(unittest.TestCase):
     def test_unknown_must_not_be_explained(self):
         truth = {"kind": "unknown", "effects": [], "unknown": "hose", "law_axes": ["X"], "law_points": ["table_force"]}
         law = {"axis": "X", "point": "table_force", "behaves_like": ""}
-        self.assertTrue(grading.grade(truth, report(verdict="UNEXPLAINED", law=law), 1)["law_right"])
+        self.assertTrue(grading.grade(truth, report(verdict="UNEXPLAINED", laws=[law]), 1)["law_right"])
         self.assertFalse(grading.grade(truth, report(found("cable_chain", "X")), 1)["rejected"])
 
     def test_summary_counts(self):

@@ -502,10 +502,10 @@ def bellows_at_the_end(m, rng):
 
 
 @unknown
-def friction_far_out(m, rng):
-    """Dry friction of Y rises linearly over the far half of the ring."""
-    h = rng.uniform(0.4, 1.0)
-    m.friction_factor.append((1, lambda t, x, v: 1 + h * max(x - PIECE[1], 0.0) / 0.015))
+def friction_in_waves(m, rng):
+    """A guide of Y that is hard and soft in turn, every 12 mm."""
+    h = rng.uniform(0.2, 0.6)
+    m.friction_factor.append((1, lambda t, x, v: 1 + h * np.sin(TURN * x / 12e-3)))
     return {"law": "force on Y as sgn(v_Y) f(y)", "hook": "table_force", "axis": "Y"}
 
 
