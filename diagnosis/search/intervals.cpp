@@ -35,8 +35,10 @@ bool is_none_of_its_shape(const FreedNumber& number) {
 
 /// The largest amplitude of the effect of a number that has its unit: what a law gets wrong about
 /// one of them shows in the others. In the unit of the key; of a phase a radian, as what is as
-/// large as a share of the wave and not in phase with it turns it by that share of one.
+/// large as a share of the wave and not in phase with it turns it by that share of one. Where a
+/// scale ends is read off and hangs on the form of no law.
 double size_of(const FittedMachine& machine, const FreedNumber& number) {
+  if (is_limit(number.number)) return 0;
   if (is_phase(number.number)) return 1 / si_of_unit(number.number.key);
   double largest = std::abs(number.value);
   for (const AddedEffect& a : machine.added) {
