@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "diagnosis/record_notes.hpp"
 #include "diagnosis/replica/model_comparison.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
 #include "diagnosis/search/common_numbers.hpp"
@@ -31,8 +32,6 @@ constexpr double kLoud = 1.5, kWrongOfFound = 0.05;
 constexpr double kKnownTogether = 0.2;
 /// Times the noise of a sample by which readings may shift from lap to lap.
 constexpr double kShifted = 3;
-/// Part of the readings that may count less without a word.
-constexpr double kSomeTurn = 0.005;
 /// Times what is declared that no declared number is.
 constexpr double kUnlikelyTimes = 4;
 const EffectText* text_of(const std::string& effect) {
@@ -88,7 +87,7 @@ class Report {
     d_.warnings = of.record.warnings;
     d_.suspects = options.suspects;
     const NoiseAudit& noise = evidence.noise();
-    d_.warnings.insert(d_.warnings.end(), noise.warnings.begin(), noise.warnings.end());
+    add(d_.warnings, noise.warnings);
   }
 
   Diagnosis write() {
@@ -96,16 +95,16 @@ class Report {
     tell_effects();
     tell_uncertain();
     tell_clamping();
-    tell_noise_lines();
-    tell_events();
-    tell_turning();
+    add(d_.notes, notes_of_lines(evidence_, before_.chatter, d_.effects));
+    add(d_.notes, notes_of_events(evidence_));
+    add(d_.notes, notes_of_turning(evidence_));
     std::vector<std::string> off = what_is_still_off();
     still_off_ = !off.empty();
     if (!selection_.interrupted) tell_laws();
     if (!d_.laws.empty()) off = what_is_still_off();
     // Without a law, numbers were pulled for want of it.
-    if (d_.laws.empty()) d_.notes.insert(d_.notes.end(), pulled_.begin(), pulled_.end());
-    d_.notes.insert(d_.notes.end(), off.begin(), off.end());
+    if (d_.laws.empty()) add(d_.notes, pulled_);
+    add(d_.notes, off);
     tell_chatter();
     tell_shifts_between_laps();
     std::stable_sort(d_.effects.begin(), d_.effects.end(), [](const auto& a, const auto& b) {
@@ -121,6 +120,9 @@ class Report {
   }
 
  private:
+  static void add(std::vector<std::string>& to, const std::vector<std::string>& sentences) {
+    to.insert(to.end(), sentences.begin(), sentences.end());
+  }
   const FittedMachine& found() const { return selection_.found; }
   double excess(double held_out) const { return std::max(0.0, held_out - floor_); }
 
@@ -419,28 +421,6 @@ class Report {
     }
   }
 
-  static std::string vibration(const NoiseLine& line) {
-    const ShownUnit unit = shown_unit(line.channel);
-    return fmt::format("{} with {:.2f} Hz and {:.3g} {}", channel_name(line.channel),
-                       line.frequency, line.amplitude * unit.factor, unit.name);
-  }
-
-  static std::string trembling(const Unrest& u) {
-    const ShownUnit unit = shown_unit(u.channel);
-    return fmt::format("{} {} by {:.3g} {} rms", channel_name(u.channel),
-                       u.at_rest ? "trembles at rest" : "differs from lap to lap",
-                       u.rms.value_or(0) * unit.factor, unit.name);
-  }
-
-  /// Whether a line is that of an axis that vibrates by itself.
-  bool is_of_chatter(const NoiseLine& line) const {
-    return std::any_of(before_.chatter.begin(), before_.chatter.end(), [&](const Chatter& c) {
-      return c.has_line() &&
-             ((line.channel.axis == c.axis && !is_reading(line.channel.kind)) ||
-              std::abs(line.frequency - c.line.frequency) < 0.02 * c.line.frequency);
-    });
-  }
-
   /// What a number does to the contour by standing where it stands.
   double moved_by(const FreedNumber& n) const {
     Machine without = found().machine;
@@ -491,30 +471,6 @@ class Report {
     }
   }
 
-  /// A line that no effect of the model makes is a disturbance that does not repeat.
-  void tell_noise_lines() {
-    for (const NoiseLine& line : evidence_.noise().lines) {
-      const bool named =
-          std::any_of(d_.effects.begin(), d_.effects.end(), [&](const FoundEffect& e) {
-            return std::any_of(e.numbers.begin(), e.numbers.end(), [&](const FittedNumber& n) {
-              return n.key.ends_with("frequency_Hz") && std::abs(n.value - line.frequency) < 0.5;
-            });
-          });
-      if (named || is_of_chatter(line)) continue;
-      const bool mains = std::abs(line.frequency - 50) < 0.4 || std::abs(line.frequency - 60) < 0.4;
-      const bool probe = is_reading(line.channel.kind);
-      d_.notes.push_back(fmt::format(
-          "{} holds a disturbance of {:.2f} Hz that does not repeat with the laps, amplitude "
-          "{:.3g} {}, {:.0f} times the noise around it{}",
-          channel_name(line.channel), line.frequency,
-          line.amplitude * shown_unit(line.channel).factor, shown_unit(line.channel).name,
-          line.strength,
-          mains   ? " (mains)."
-          : probe ? " (vibration between tool and piece)."
-                  : "."));
-    }
-  }
-
   /// Readings that are elsewhere in every lap: noise to a fit, but more than samples have.
   void tell_shifts_between_laps() {
     if (selection_.interrupted || !options_.suspects.empty()) return;
@@ -533,29 +489,6 @@ class Report {
           shift / noise));
       if (!named) d_.vibrations.push_back(text);
     }
-  }
-
-  /// What an axis did in one lap and not in another.
-  void tell_events() {
-    std::map<std::size_t, std::string> times;
-    for (const LapEvent& e : evidence_.events())
-      times[e.axis] += fmt::format("{}{:.2f}", times.contains(e.axis) ? ", " : "",
-                                   evidence_.record().time_of((e.begin + e.end) / 2));
-    for (const auto& [axis, at] : times)
-      d_.notes.push_back(fmt::format(
-          "{} does not do the same in all laps about {} s, as an axis that stops in its friction "
-          "may, and in its first lap; these moments were left out.",
-          kAxisNames[axis], at));
-  }
-
-  /// Readings that count less than the figures tell, which are of all alike.
-  void tell_turning() {
-    for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
-      if (const double share = evidence_.share_of_turning(c); share > kSomeTurn)
-        d_.notes.push_back(fmt::format(
-            "{}: {} of the readings count less, taken while what is off goes over from one state "
-            "to another; no signal of a drive tells when it should.",
-            channel_name(evidence_.replica().channels()[c]), percent(share)));
   }
 
   void flag_minor() {
@@ -729,7 +662,7 @@ class Report {
                               evidence_.rms(after, c, role), evidence_.noise_left(c)});
     if (d_.effects.empty()) return;
     const std::vector<std::string> worse = signals_made_worse(d_.figures);
-    d_.warnings.insert(d_.warnings.end(), worse.begin(), worse.end());
+    add(d_.warnings, worse);
     std::vector<SignalFigure> at_rest = d_.figures;
     std::erase_if(at_rest, [&](const SignalFigure& f) { return is_stirred(f.channel); });
     made_worse_ = !signals_made_worse(at_rest).empty();
