@@ -220,10 +220,12 @@ std::string list_section(const char* title, const std::vector<std::string>& line
   return text + "</ul>\n";
 }
 
-std::string law_section(const LearnedLaw& law) {
+std::string law_section(const LearnedLaw& law, bool first) {
   std::string text =
-      "<h2>A law without a name</h2>\n<p>" + escaped(law_words({law})) +
-      fmt::format(", which takes {:.0f} % of what is otherwise left.</p>\n", 100 * law.share) +
+      fmt::format("<h2>{}</h2>\n<p>", first ? "A law without a name" : "A further law") +
+      escaped(law_words({law})) +
+      fmt::format(", which takes {:.0f} % of what {} left.</p>\n", 100 * law.share,
+                  first ? "is otherwise" : "those before have") +
       figure(law_figure(law),
              "f, as it was learned, with the band of 95 %: " + law_numbers(law) + ".");
   if (law.not_distinguishable_from.empty()) return text;
@@ -260,7 +262,7 @@ std::string diagnosis_page(const DiagnosisStory& story) {
     for (const FoundEffect& e : d.effects) page += effect_box(e);
   }
   page += uncertain_section(d.uncertain);
-  for (const LearnedLaw& law : d.laws) page += law_section(law);
+  for (const LearnedLaw& law : d.laws) page += law_section(law, &law == d.laws.data());
   const std::vector<std::size_t> shown = shown_channels(story.residuals);
   if (!shown.empty())
     page += "<h2>Measured less predicted</h2>\n" +

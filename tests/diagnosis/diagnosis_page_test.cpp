@@ -164,6 +164,31 @@ TEST(ExplainedBy, FindsWhatAResidualGoesAlongWith) {
   for (const RelatedQuantity& c : all) EXPECT_LT(explained_by(c, noise), 0.03) << c.name;
 }
 
+TEST(DiagnosisPage, TellsEveryLawOnWhatThoseBeforeLeave) {
+  Diagnosis d;
+  d.verdict = DiagnosisVerdict::unexplained;
+  for (const char* words : {"displacement on X as f(q_Y)", "displacement on X as q_X f(q_Y)"}) {
+    LearnedLaw& law = d.laws.emplace_back();
+    law.words = words;
+    law.law.over = Covariate::position;
+    law.law.at = law.low = law.high = law.law.value = {0, 1};
+    law.share = d.laws.size() == 1 ? 0.83 : 0.55;
+  }
+  const std::string both =
+      "behaves like displacement on X as f(q_Y) and like displacement on X as q_X f(q_Y)";
+  EXPECT_NE(to_text(d).find(both), std::string::npos);
+  const auto json = nlohmann::json::parse(to_json(d, "run"));
+  ASSERT_EQ(json["laws"].size(), 2u);
+  EXPECT_EQ(json["laws"][1]["behaves_like"], "displacement on X as q_X f(q_Y)");
+  const Record record = swinging();
+  const std::string page = diagnosis_page({d, record, {}});
+  for (const std::string& part :
+       {both, std::string("83 % of what is otherwise left"),
+        std::string("A further law</h2>\n<p>behaves like displacement on X as q_X f(q_Y), which "
+                    "takes 55 % of what those before have left.")})
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+}
+
 TEST(DiagnosisPage, TellsTheStoryInPicturesAndIsSelfContained) {
   const Record record = swinging();
   Diagnosis d = found_backlash();
