@@ -18,8 +18,11 @@ namespace vcnc {
 namespace {
 
 /// Of the best laws by their columns: those that may get more knots, and that are simulated.
-constexpr std::size_t kDrawnFiner = 6, kSimulated = 3;
+constexpr std::size_t kDrawnFiner = 3, kSimulated = 3;
 constexpr double kWorthAKnot = 0.02;  ///< of what is left
+/// Times what few knots promise, that more may; what columns do, that the loop may show; and part
+/// of what the best one promises with few that another one must.
+constexpr double kMoreByKnots = 3, kMoreInTheLoop = 1.5, kComparable = 0.5;
 /// Of those, what may gain most when it is fitted again: a jump as well as what is smeared over it.
 constexpr std::size_t kRefined = 2;
 constexpr double kNearlyBest = 0.85;
@@ -49,8 +52,9 @@ struct Ranked {
   }
 };
 
+/// `worth`: gain that a knot must have; laws that promise less than `least` get none.
 Ranked ranked(const Evidence& evidence, const LawColumns& columns, const Ground& ground,
-              double excess, double least) {
+              double excess, double worth, double least) {
   const auto fitted = [&](const Law& law) {
     return fit_law(evidence, ground, columns.columns(law));
   };
@@ -62,6 +66,7 @@ Ranked ranked(const Evidence& evidence, const LawColumns& columns, const Ground&
   all.order.resize(all.laws.size());
   std::iota(all.order.begin(), all.order.end(), 0);
   all.sort();
+  if (!all.order.empty()) least = std::max(least, kComparable * all.fits[all.order.front()].gain);
   for (std::size_t rank = 0; rank < std::min(kDrawnFiner, all.order.size()); ++rank) {
     Law& law = all.laws[all.order[rank]];
     LinearLaw& f = all.fits[all.order[rank]];
@@ -69,7 +74,7 @@ Ranked ranked(const Evidence& evidence, const LawColumns& columns, const Ground&
     if (f.gain < least || law.over == Covariate::time) continue;
     GainWithHats gain(evidence, ground, columns, law);
     law.at =
-        with_more_knots(law.at, std::ref(gain), std::max(least, kWorthAKnot * (excess - f.gain)));
+        with_more_knots(law.at, std::ref(gain), std::max(worth, kWorthAKnot * (excess - f.gain)));
     f = fitted(law);
   }
   all.sort();
@@ -99,8 +104,12 @@ FittedMachine learned(const Evidence& evidence, const FittedMachine& at, const M
 }
 
 bool takes_names_away(double alone, const Named& named, double needed) {
-  if (named.count <= 1) return alone > named.gain + needed + kWrongAboutOne * named.gain;
-  return alone > named.gain - (named.count >= kImitation ? kOfTheLeast * named.least : 0);
+  return alone > to_take_away(named, needed);
+}
+
+double to_take_away(const Named& named, double needed) {
+  if (named.count <= 1) return named.gain + needed + kWrongAboutOne * named.gain;
+  return named.gain - (named.count >= kImitation ? kOfTheLeast * named.least : 0);
 }
 
 std::string words_of(const Law& law) {
@@ -126,12 +135,16 @@ std::string words_of(const Law& law) {
 }
 
 LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& doubt,
-                const DiagnosisOptions& options) {
+                const DiagnosisOptions& options, double least) {
+  LawFit none;
+  none.machine = at.machine;
   const LawColumns columns(evidence, at);
   const auto linear = std::make_shared<const LinearPart>(at.linear());
   const Ground ground(evidence, at.residual, *linear);
   const double excess = std::max(1.0, ground.held_out - evidence.count(Role::held_out));
-  const Ranked all = ranked(evidence, columns, ground, excess, options.law_gain);
+  const Ranked all = ranked(evidence, columns, ground, excess, options.law_gain,
+                            std::max(options.law_gain, least / kMoreByKnots));
+  if (all.fits.empty() || kMoreInTheLoop * all.fits[all.order.front()].gain < least) return none;
   const auto counted_of = [&](const LawInLoop& law) {
     return counted(ground.held_out - law.ground().held_out, ground.held_out_of,
                    law.ground().held_out_of, doubt);
@@ -151,8 +164,6 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
     law.refine();
     if (!best || counted_of(law) > counted_of(*best)) best = &law;
   }
-  LawFit none;
-  none.machine = at.machine;
   if (!best) return none;
 
   LawFit fit;

@@ -30,9 +30,10 @@ struct LawFit {
 };
 
 /// The best law on what `at` leaves, or one with gain 0.
-/// `doubt`: of gains, see counted_gain.hpp.
+/// `doubt`: of gains, see counted_gain.hpp. `least`: no law is of use that gains less; none is
+/// simulated whose columns promise far less.
 LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& doubt,
-                const DiagnosisOptions& options);
+                const DiagnosisOptions& options, double least = 0);
 
 /// `at` as it stands with laws that were learnt on what it leaves, all its numbers fitted again.
 FittedMachine learned(const Evidence& evidence, const FittedMachine& at, const Machine& machine);
@@ -47,12 +48,13 @@ struct Named {
   double least;       ///< what the model loses without the one it misses least
 };
 
-/// Whether a law that gains `alone` takes the names away.
+/// Whether a law that gains `alone` takes the names away: more than to_take_away().
 /// A law has ten numbers and bends to what the model of a true effect gets wrong about it, some
 /// percent of what that does: one name only goes where the law gains clearly more, besides what a
 /// law is to gain at all (`needed`). Of several names one law is the simpler account; three names
 /// or more go where it gains as much as they do but for a part of the least of them.
 bool takes_names_away(double alone, const Named& named, double needed);
+double to_take_away(const Named& named, double needed);
 
 /// "force on X as sgn(v_X) f(q_X)"
 std::string words_of(const Law& law);

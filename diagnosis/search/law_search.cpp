@@ -87,8 +87,10 @@ class LawSearch {
                           left > kImitated * excess(selection_.base.held_out);
     // It can explain all that there is at most.
     if (!too_many && !takes_names_away(named.gain + left, named, needed)) return std::nullopt;
-    LawFit law = selection_.law_alone ? *selection_.law_alone
-                                      : best_law(evidence_, selection_.base, alone_, options_);
+    const double least = too_many ? needed : to_take_away(named, needed);
+    LawFit law = selection_.law_alone
+                     ? *selection_.law_alone
+                     : best_law(evidence_, selection_.base, alone_, options_, least);
     const Names names = judged(law.gain, beside, named, needed, too_many);
     if (names == Names::stay) return std::nullopt;
     note = names == Names::replaced
