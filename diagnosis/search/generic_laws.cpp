@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <numeric>
 #include <utility>
@@ -17,15 +18,14 @@
 namespace vcnc {
 namespace {
 
-/// Of the best laws by their columns: those that may get more knots, and that are simulated.
-constexpr std::size_t kDrawnFiner = 3, kSimulated = 3;
+/// Of the best laws by their columns: those that may get more knots, and that are simulated. Of
+/// these, what may gain most when it is fitted again: a jump as well as what is smeared over it.
+constexpr std::size_t kDrawnFiner = 3, kSimulated = 3, kRefined = 2;
+constexpr double kNearlyBest = 0.85;
 constexpr double kWorthAKnot = 0.02;  ///< of what is left
 /// Times what few knots promise, that more may; what columns do, that the loop may show; and part
 /// of what the best one promises with few that another one must.
 constexpr double kMoreByKnots = 3, kMoreInTheLoop = 1.5, kComparable = 0.5;
-/// Of those, what may gain most when it is fitted again: a jump as well as what is smeared over it.
-constexpr std::size_t kRefined = 2;
-constexpr double kNearlyBest = 0.85;
 /// Part of what a true effect does that its model may be wrong by, see takes_names_away().
 constexpr double kWrongAboutOne = 0.05;
 /// Part of what the least of many names does that a law need not do.

@@ -39,8 +39,8 @@ class LawInLoop {
                                    std::unique_ptr<Acting>& acting) const;
 
   const Evidence* evidence_;
-  std::shared_ptr<const FittedMachine> without_;
-  std::shared_ptr<const LinearPart> linear_;  ///< of that
+  std::shared_ptr<const FittedMachine> without_;  ///< the law
+  std::shared_ptr<const LinearPart> linear_;      ///< of `without_`
   std::unique_ptr<Acting> acting_;
   std::vector<Column> columns_;  ///< of the values
 };

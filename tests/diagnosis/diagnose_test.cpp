@@ -703,7 +703,7 @@ TEST(Diagnose, WhatMayBeAsDeclaredIsNotTold) {
 }
 
 /// The toy machine with readings that do not go beyond a limit.
-class ClippedReplica : public toy::ToyReplica {
+class LimitedReplica : public toy::ToyReplica {
  public:
   using toy::ToyReplica::ToyReplica;
   Prediction predict(const Machine& m) const override {
@@ -727,7 +727,7 @@ TEST(Diagnose, TellsALimitThoughItIsTriedAndNotFitted) {
   std::vector<Candidate> all = toy::candidates();
   for (const Candidate& c : candidates(Machine()))
     if (c.effect == RangeClip::text.name) all.push_back(c);
-  ClippedReplica replica(record);
+  LimitedReplica replica(record);
   const Diagnosis d = diagnose({record, replica, declared, all});
   ASSERT_EQ(d.effects.size(), 1U);
   EXPECT_EQ(d.effects[0].name, "range_clip");
