@@ -595,60 +595,70 @@ class Search {
     return less;
   }
 
-  /// What was accepted when other things were still missing may be a stand-in: each effect is taken
-  /// out, each released number held again, and all candidates and declared numbers compete for the
-  /// place, with those common numbers that it had.
+  /// What was accepted when other things were still missing may be a stand-in. When one gave way,
+  /// the others are judged anew: what does as well as they was found beside the stand-in.
   void exchange(FittedMachine& m) {
-    std::size_t tries = 2 * m.found();
-    for (std::size_t i = 0; i < m.found() && tries-- > 0 && going_;) {
-      AddedEffect* effect = i < m.added.size() ? &m.added[i] : nullptr;
-      ReleasedNumber* number = effect ? nullptr : &m.released[i - m.added.size()];
-      FittedMachine less =
-          effect ? taken_out(m, i, Common::free) : m.holding(number->key, result_.base);
-      Contest contest(rules_, less);
-      const double lost = contest.held_out() - m.held_out;
-      std::vector<Contender> rivals =
-          contest.rivals(kNearLoss * lost, effect ? effect->candidate : candidates_.size());
-      if (number)
-        std::erase_if(rivals, [&](const Contender& r) { return r.released == number->key; });
-      std::vector<std::size_t>& alike = effect ? effect->class_with : number->class_with;
-      alike.clear();
-      for (const Contender& r : rivals)
-        if (r.released.empty() && r.gain > std::max(lost - contest.band_of(lost), 0.5 * lost))
-          alike.push_back(r.candidate);
-      const double worth =
-          contest.counts(m) - 4 * static_cast<double>(effect ? effect->numbers.size() : 1);
-      const auto simpler = [&](const Contender& r) {
-        return effect ? contest.says_it_simpler(r, *effect, lost)
-                      : contest.is_more_usual(r, number_of_key(m, number->key), lost);
-      };
-      // What is missing still, one that has more numbers may imitate a little of.
-      const double imitated = kHalf * rules_.excess(m.held_out);
-      const auto clearly = [&](const Contender& r) {
-        return effect && contest.intricacy(r) > contest.intricacy(*effect) ? imitated : 0;
-      };
-      const auto better = std::find_if(rivals.begin(), rivals.end(), [&](const Contender& r) {
-        return simpler(r) || r.worth() >= worth + clearly(r);
-      });
-      if (better != rivals.end()) {
-        // What takes the place of a declared number says more, and must do clearly better: else
-        // the number took its place again.
-        const double allowed_loss = simpler(*better) ? contest.band_of(lost)
-                                    : number         ? -contest.band_of(lost)
-                                                     : -options_.least_gain;
-        const double least = counted_within(m, contest) - allowed_loss;
-        FittedMachine instead = less;
-        add(instead, *better, {});
-        if (holds_up(instead) && is_certain(instead) && counted_within(instead, contest) >= least) {
-          m = std::move(instead);  // the last of its kind, so that the next one is here
-          continue;
-        }
-        rivals.erase(better);
+    std::size_t exchanges = m.found() + 1;
+    for (std::size_t i = 0; i < m.found() && going_;)
+      if (gives_way(m, i, exchanges > 0)) {
+        --exchanges;
+        i = 0;
+      } else {
+        evidence_.anchor(m.machine);
+        ++i;
       }
-      if (effect && exchange_for_as_good(m, i, less, rivals, contest, lost)) continue;
-      evidence_.anchor(m.machine);
-      ++i;
+  }
+
+  /// An effect is taken out, or a released number held again, and all candidates and declared
+  /// numbers compete for the place, with those common numbers that it had. Those that do as well
+  /// become its class; whether another one took the place.
+  bool gives_way(FittedMachine& m, std::size_t i, bool may_give_way) {
+    AddedEffect* effect = i < m.added.size() ? &m.added[i] : nullptr;
+    ReleasedNumber* number = effect ? nullptr : &m.released[i - m.added.size()];
+    FittedMachine less =
+        effect ? taken_out(m, i, Common::free) : m.holding(number->key, result_.base);
+    Contest contest(rules_, less);
+    const double lost = contest.held_out() - m.held_out;
+    std::vector<Contender> rivals =
+        contest.rivals(kNearLoss * lost, effect ? effect->candidate : candidates_.size());
+    if (number)
+      std::erase_if(rivals, [&](const Contender& r) { return r.released == number->key; });
+    std::vector<std::size_t>& alike = effect ? effect->class_with : number->class_with;
+    alike.clear();
+    for (const Contender& r : rivals)
+      if (r.released.empty() && r.gain > std::max(lost - contest.band_of(lost), 0.5 * lost))
+        alike.push_back(r.candidate);
+    if (!may_give_way) return false;
+    const double worth =
+        contest.counts(m) - 4 * static_cast<double>(effect ? effect->numbers.size() : 1);
+    const auto simpler = [&](const Contender& r) {
+      return effect ? contest.says_it_simpler(r, *effect, lost)
+                    : contest.is_more_usual(r, number_of_key(m, number->key), lost);
+    };
+    // What is missing still, one that has more numbers may imitate a little of.
+    const double imitated = kHalf * rules_.excess(m.held_out);
+    const auto clearly = [&](const Contender& r) {
+      return effect && contest.intricacy(r) > contest.intricacy(*effect) ? imitated : 0;
+    };
+    const auto better = std::find_if(rivals.begin(), rivals.end(), [&](const Contender& r) {
+      return simpler(r) || r.worth() >= worth + clearly(r);
+    });
+    if (better != rivals.end()) {
+      // What takes the place of a declared number says more, and must do clearly better: else
+      // the number took its place again.
+      const double allowed_loss = simpler(*better) ? contest.band_of(lost)
+                                  : number         ? -contest.band_of(lost)
+                                                   : -options_.least_gain;
+      const double least = counted_within(m, contest) - allowed_loss;
+      FittedMachine instead = less;
+      add(instead, *better, {});
+      if (holds_up(instead) && is_certain(instead) && counted_within(instead, contest) >= least) {
+        m = std::move(instead);
+        return true;
+      }
+      rivals.erase(better);
     }
+    return effect && exchange_for_as_good(m, i, less, rivals, contest, lost);
   }
 
   static const FreedNumber& number_of_key(const FittedMachine& m, const std::string& key) {
