@@ -372,12 +372,13 @@ Verdict judge(Work& w, const EffectText& text, std::size_t axis) {
 
 Verdict judge(Work& w, const Law& law) {
   const bool position = law.point == Law::Point::displacement || law.point == Law::Point::command;
-  const bool sign = law.times == Covariate::sign && law.times_axis == law.over_axis;
+  const bool by_direction =
+      !law.grows() && law.times != Covariate::time && law.times_axis == law.over_axis;
   if (!position || law.over != Covariate::position || law.at.empty() ||
-      !(sign || law.times == Covariate::time))
+      !(by_direction || law.times == Covariate::time))
     return no(
-        "only a displacement or a command over a position, as it is or with the sign of that "
-        "axis' motion, is a table");
+        "only a displacement or a command over a position, as it is, one way only or with the "
+        "sign of that axis' motion, is a table");
   CompensationTable table;
   table.axis = name_of(law.axis_index());
   table.over = static_cast<CompensationTable::OfAxis>(law.over_axis);
@@ -388,8 +389,16 @@ Verdict judge(Work& w, const Law& law) {
     table.at.push_back(table.at.front() + kApart);
     table.error.push_back(table.error.front());
   }
-  if (sign)
-    for (double v : table.error) table.error_reverse.push_back(-v);
+  if (by_direction) {
+    const double forwards = law.times == Covariate::backwards ? 0 : 1,
+                 backwards = law.times == Covariate::forwards ? 0
+                             : law.times == Covariate::sign   ? -1
+                                                              : 1;
+    for (double& v : table.error) {
+      table.error_reverse.push_back(backwards * v);
+      v *= forwards;
+    }
+  }
   return add(w, std::move(table));
 }
 

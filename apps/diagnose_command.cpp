@@ -25,6 +25,7 @@
 #include "diagnosis/report/diagnosis_json.hpp"
 #include "diagnosis/report/diagnosis_page.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
+#include "diagnosis/search/controller_lags.hpp"
 #include "diagnosis/search/freed_number.hpp"
 #include "diagnosis/search/suspects.hpp"
 #include "diagnosis/search/unknown_force.hpp"
@@ -91,16 +92,13 @@ void tell_unknown_forces(const ForceOfAxes& unknown, std::vector<std::string>& n
 void tell_lags(const Machine& declared, const Machine& healthy, std::vector<std::string>& notes) {
   std::string lags;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    const ServoParams &was = declared.axes[axis].servo, &is = healthy.axes[axis].servo;
-    if (is.position_lag == was.position_lag && is.velocity_lag == was.velocity_lag) continue;
-    lags += fmt::format("; {} {:.0f} and {:.0f}, declared {:.0f} and {:.0f}", kAxisNames[axis],
-                        1e6 * is.position_lag, 1e6 * is.velocity_lag, 1e6 * was.position_lag,
-                        1e6 * was.velocity_lag);
+    const std::string told = told_lags(declared.axes[axis].servo, healthy.axes[axis].servo);
+    if (!told.empty()) lags += fmt::format("; {}: {}", kAxisNames[axis], told);
   }
   if (!lags.empty())
     notes.push_back(
-        "The controllers of the reference run are as with these position_lag_us and "
-        "velocity_lag_us, which count in this run, too" +
+        "The controllers of the reference run are as with other lags than declared, which count in "
+        "this run, too" +
         lags + ".");
 }
 

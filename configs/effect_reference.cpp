@@ -271,9 +271,9 @@ axis and runs through the closed loop:
 `over` is its argument c: `time` (knots `at_s`), or `position`, `velocity`, `acceleration` of
 `over_axis` (`at_mm`, `at_mm_s`, `at_mm_s2`; of A and C `at_deg`, `at_deg_s`, `at_deg_s2`).
 `times` is the factor m: `one`, or `sign`, `position`, `velocity`, `acceleration` of `times_axis`
-(the sign of its velocity, else its value in SI). Laws act after the effects of the same port. A
-drive knows the true motion of its own axis and the commanded motion of the others; the probe knows
-the true motion of all.
+(the sign of its velocity, else its value in SI), or `forwards`, `backwards` (1 while it goes that
+way, else 0). Laws act after the effects of the same port. A drive knows the true motion of its own
+axis and the commanded motion of the others; the probe knows the true motion of all.
 
 | point | port | y is | values |
 |---|---|---|---|

@@ -50,7 +50,8 @@ const std::vector<std::string> kGains{"kv_error",
                                       "integral_time_error",
                                       "command_delay",
                                       "position_lag_us",
-                                      "velocity_lag_us"};
+                                      "velocity_lag_us",
+                                      "feedforward_lag_us"};
 
 /// What a probe and the geometry of a healthy machine have, too.
 const std::vector<std::string> kMeasuring{"surface_friction", "probe_gain",     "cross_talk",
@@ -62,11 +63,11 @@ const std::vector<std::string> kMeasuring{"surface_friction", "probe_gain",     
 std::vector<Candidate> lags(const Machine& declared) {
   std::vector<Candidate> all;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    for (const std::string key : {"position_lag_us", "velocity_lag_us"})
+    for (const LoopLag& lag : kLoopLags)
       if (declared.axes[axis].servo.controller == ServoParams::Controller::cascade)
-        all.push_back({.effect = key,
+        all.push_back({.effect = std::string(lag.key),
                        .place = std::string(kAxisNames[axis]),
-                       .numbers = {{.key = fmt::format("axes.{}.{}", kAxisNames[axis], key),
+                       .numbers = {{.key = fmt::format("axes.{}.{}", kAxisNames[axis], lag.key),
                                     .typical = 100,
                                     .min = 0,
                                     .max = 5000,
@@ -144,8 +145,8 @@ bool nothing_moved(const std::vector<FreedNumber>& begun, const std::vector<Free
 }
 
 std::string told(const Candidate& c) {
-  if (c.effect == "position_lag_us") return "lag of the position loop";
-  if (c.effect == "velocity_lag_us") return "lag of the measured velocity";
+  for (const LoopLag& lag : kLoopLags)
+    if (c.effect == lag.key) return "lag of " + std::string(lag.of);
   return c.effect == "deviation" ? c.place : c.effect;
 }
 
@@ -221,13 +222,10 @@ class Commissioner {
 
   void tell_lags(const Machine& m) {
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      const ServoParams &is = m.axes[axis].servo, &was = of_.declared.axes[axis].servo;
-      if (is.position_lag == was.position_lag && is.velocity_lag == was.velocity_lag) continue;
-      result_.notes.push_back(fmt::format(
-          "{}: by its controller's own signals, lag of the position loop {:.0f} -> {:.0f} us, of "
-          "the measured velocity {:.0f} -> {:.0f} us",
-          kAxisNames[axis], 1e6 * was.position_lag, 1e6 * is.position_lag, 1e6 * was.velocity_lag,
-          1e6 * is.velocity_lag));
+      const std::string lags = told_lags(of_.declared.axes[axis].servo, m.axes[axis].servo);
+      if (!lags.empty())
+        result_.notes.push_back(
+            fmt::format("{}: by its controller's own signals, lag of {}", kAxisNames[axis], lags));
     }
   }
 

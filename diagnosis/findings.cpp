@@ -299,8 +299,8 @@ class Report {
     if (others.empty()) return;
     if (of_.record.on_table) {  // no program of ours moves about a ball on the table
       d_.notes.push_back(
-          fmt::format("{} may be told apart from the others of its class by the same test with the "
-                      "ball at another place of the table.",
+          fmt::format("{} may be told apart from the others of its class by the same test with "
+                      "another feed or size, or at another place of the table.",
                       name_of(e)));
       return;
     }

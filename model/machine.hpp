@@ -88,6 +88,7 @@ struct ServoParams {
   double current_lag = 0;          ///< first-order lag of the force/torque [s]
   double position_lag = 0;         ///< first-order lag of the position loop [s], cascade only
   double velocity_lag = 0;         ///< of the filter of the measured velocity [s], cascade only
+  double feedforward_lag = 0;      ///< of both feed-forwards [s], cascade only
   Feedback feedback = Feedback::load;
 
   template <class Self, class Visit>
@@ -115,6 +116,10 @@ struct ServoParams {
           "feed-forward passes by it");
     visit("velocity_lag_us", p.velocity_lag, unit::us, Range{0, 5000},
           "lag of the filter of a cascade's measured velocity");
+    visit("feedforward_lag_us", p.feedforward_lag, unit::us, Range{0, 5000},
+          "lag of a cascade's feed-forward of velocity and acceleration; of differences of "
+          "set-points "
+          "half a cycle and more");
     visit.choice("feedback", p.feedback, {{"motor", Feedback::motor}, {"load", Feedback::load}},
                  "measuring system: indirect (motor) or direct (load)");
   }

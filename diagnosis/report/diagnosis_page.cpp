@@ -61,7 +61,7 @@ std::string interval_bar(const FittedNumber& n) {
       share(0), share(n.low), share(n.high) - share(n.low));
 }
 
-std::string effect_box(const FoundEffect& e) {
+std::string effect_box(const FoundEffect& e, const Diagnosis& d) {
   const bool deviation = e.name == "deviation";
   std::string text = fmt::format(
       "<div class=\"effect{}\"><h3>{} <small>{}{}</small></h3>\n<table><tr><th>number</th>"
@@ -72,9 +72,10 @@ std::string effect_box(const FoundEffect& e) {
       : e.acquisition ? ", of the measurement"
                       : "");
   for (const FittedNumber& n : e.numbers)
-    text +=
-        fmt::format("<tr><td><code>{}</code></td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-                    escaped(n.key), with_interval(n), escaped(unit_of_key(n.key)), interval_bar(n));
+    text += fmt::format("<tr><td><code>{}</code></td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                        escaped(n.key),
+                        with_interval(n) + (deviation ? "; " + against_declared(n, d) : ""),
+                        escaped(unit_of_key(n.key)), interval_bar(n));
   text += "</table><p>";
   if (std::isfinite(e.gain))
     text += fmt::format("Chi-square gained on what was held out: {:.3g}. ", e.gain);
@@ -259,7 +260,7 @@ std::string diagnosis_page(const DiagnosisStory& story) {
                         escaped(fmt::to_string(fmt::join(d.suspects, ", "))));
   if (!d.effects.empty()) {
     page += "<h2>What was found</h2>\n";
-    for (const FoundEffect& e : d.effects) page += effect_box(e);
+    for (const FoundEffect& e : d.effects) page += effect_box(e, d);
   }
   page += uncertain_section(d.uncertain);
   for (const LearnedLaw& law : d.laws) page += law_section(law, &law == d.laws.data());

@@ -7,6 +7,7 @@
 
 #include "diagnosis/replica/model_comparison.hpp"
 #include "diagnosis/report/shown_law.hpp"
+#include "diagnosis/search/freed_number.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {
@@ -35,6 +36,14 @@ std::string with_interval(const FittedNumber& n) {
       least > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(least))), 0, 9) : 3;
   return fmt::format("{:.{}f} [{:.{}f} .. {:.{}f}]", n.value, digits, n.low, digits, n.high,
                      digits);
+}
+
+/// "+79 [+65 .. +94] against the reference run"
+std::string against_declared(const FittedNumber& n, const Diagnosis& d) {
+  const double was = number_of(d.declared, n.key);
+  const FittedNumber change{n.key, n.value - was, n.low - was, n.high - was};
+  return fmt::format("{} against {}", with_interval(change),
+                     d.differential ? "the reference run" : "what is declared");
 }
 
 std::string percent(double share) {
@@ -104,8 +113,11 @@ std::string to_text(const Diagnosis& d) {
   for (const FoundEffect& e : d.effects) {
     std::string numbers;
     for (const FittedNumber& n : e.numbers) {
-      const std::string key = e.name == "deviation" ? n.key : short_key(n.key, e.name);
-      numbers += fmt::format("{}{} = {}", numbers.empty() ? "" : ", ", key, with_interval(n));
+      const std::string separator = numbers.empty() ? "" : ", ";
+      numbers +=
+          e.name == "deviation"
+              ? separator + with_interval(n) + ", " + against_declared(n, d)
+              : fmt::format("{}{} = {}", separator, short_key(n.key, e.name), with_interval(n));
     }
     text += fmt::format("  {}{}: {}; contour error {:+.3g} um rms\n", name_of(e),
                         e.minor         ? " (minor)"

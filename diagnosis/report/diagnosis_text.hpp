@@ -18,6 +18,8 @@ std::string verdict_sentence(const Diagnosis& diagnosis);
 
 /// Value with as many digits as its interval deserves.
 std::string with_interval(const FittedNumber& number);
+/// A declared number that is out of tolerance: by how much.
+std::string against_declared(const FittedNumber& number, const Diagnosis& diagnosis);
 
 /// A share in percent: whole ones, below 1 the first digit that is not nought.
 std::string percent(double share);

@@ -22,6 +22,8 @@ Shown shown_covariate(Covariate of, bool rotary) {
     case Covariate::acceleration:
       return {"acceleration", length + "/s^2", factor};
     case Covariate::sign:
+    case Covariate::forwards:
+    case Covariate::backwards:
       break;
   }
   return {"direction", "1", 1};
@@ -45,7 +47,7 @@ Shown shown_value(const Law& law) {
     case Law::Point::displacement:
       y = {"displacement", rotary ? "arcsec" : "um", rotary ? 3600 / kDegree : 1e6};
   }
-  if (law.times == Covariate::time || law.times == Covariate::sign) return y;
+  if (!law.grows()) return y;
   const Shown per = shown_covariate(law.times, is_rotary(static_cast<std::size_t>(law.times_axis)));
   return {y.name, y.unit + " per " + per.unit, y.factor / per.factor};
 }

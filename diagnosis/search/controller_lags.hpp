@@ -1,22 +1,43 @@
 // Lags of the loops of a healthy machine, which hardly anybody can declare.
 //
-// How late a position loop acts, and a velocity is measured, depends on cycles and filters of a
-// drive, and on whether its feed-forward is as late. Where it is not as declared, a position is off
-// by what no force makes (controller_check.hpp), in proportion to speed and acceleration, and what
-// that hides is put down to something else. Lags are fitted to nothing but r of the healthy run, by
-// least squares, so that friction has no say:
+// How late a position loop acts, a velocity is measured and a feed-forward comes depends on cycles
+// and filters of a drive. Where it is not as declared, a position is off by what no force makes
+// (controller_check.hpp), in proportion to speed and acceleration, and what that hides is put down
+// to something else. (A velocity that is measured late puts an axis ahead by a tau / Kv where it
+// accelerates, a feed-forward that is late behind by as much: what both leave is what counts.) Lags
+// are fitted to nothing but r of the healthy run, by least squares, so that friction has no say:
 //
 //   min | r - sum_i d r / d tau_i  (tau_i - tau_i declared) |^2,   0 <= tau_i <= 2 ms
 //
-// and are kept where they take half of its mean square at least and that is more than noise. Gains
-// stay as declared. None is fitted of a sampled controller, whose lags are another number, nor
-// where command, position or force of an axis is not recorded.
+// and are kept where they take half of its mean square at least and that is more than noise: first
+// those of velocity and feed-forward, then that of the position loop, too, where it leaves a
+// quarter of what these do (with full feed-forward that loop has next to nothing to be late with).
+// Gains stay as declared. None is fitted of a sampled controller, whose lags are another number,
+// nor where command, position or force of an axis is not recorded.
 #pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
 
 #include "diagnosis/records/record.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {
+
+/// A lag of a cascade.
+struct LoopLag {
+  double ServoParams::*value;  ///< [s]
+  std::string_view key, of;    ///< "position_lag_us", "the position loop"
+};
+inline constexpr std::array<LoopLag, 3> kLoopLags{
+    LoopLag{&ServoParams::position_lag, "position_lag_us", "the position loop"},
+    LoopLag{&ServoParams::velocity_lag, "velocity_lag_us", "the measured velocity"},
+    LoopLag{&ServoParams::feedforward_lag, "feedforward_lag_us", "the feed-forward"}};
+
+/// Lags that are others, "the position loop 250 -> 0 us, the feed-forward 0 -> 480 us"; empty:
+/// none. Those that went as far as is sought say so.
+std::string told_lags(const ServoParams& was, const ServoParams& is);
 
 /// The declared machine with the lags of its loops as a healthy run has them.
 Machine with_lags_of(const Record& healthy, const Machine& declared);

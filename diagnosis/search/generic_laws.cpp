@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <numeric>
@@ -12,6 +13,7 @@
 #include "diagnosis/search/law_fit.hpp"
 #include "diagnosis/search/law_in_loop.hpp"
 #include "diagnosis/search/law_knots.hpp"
+#include "diagnosis/search/law_places.hpp"
 #include "diagnosis/search/parallel.hpp"
 #include "model/axes.hpp"
 
@@ -31,7 +33,8 @@ constexpr double kWrongAboutOne = 0.05;
 /// Part of what the least of many names does that a law need not do.
 constexpr double kOfTheLeast = 0.1;
 constexpr double kNormal95 = 1.96;
-constexpr std::size_t kMostAlike = 5;  ///< that are named
+constexpr double kContradicted = 0.05;  ///< of a gain, that a law may lose elsewhere
+constexpr std::size_t kMostAlike = 5;   ///< that are named
 
 /// Laws by their columns, the best ones first.
 struct Ranked {
@@ -52,13 +55,15 @@ struct Ranked {
   }
 };
 
-/// `worth`: gain that a knot must have; laws that promise less than `least` get none.
+/// `left`: of the residual; `worth`: gain that a knot must have; laws that promise less than
+/// `least` get none.
 Ranked ranked(const Evidence& evidence, const LawColumns& columns, const Ground& ground,
-              double excess, double worth, double least) {
+              const Column& left, double excess, double worth, double least) {
   const auto fitted = [&](const Law& law) {
     return fit_law(evidence, ground, columns.columns(law));
   };
   Ranked all{columns.all(), {}, {}};
+  for (Law& place : laws_of_places(evidence, columns, left)) all.laws.push_back(std::move(place));
   for (Law& jump : columns.jumps([&](const Law& law) { return fitted(law).gain; }))
     all.laws.push_back(std::move(jump));
   all.fits.resize(all.laws.size());
@@ -93,6 +98,13 @@ std::vector<std::string> alike(const Ranked& all, const std::string& told, doubl
 
 }  // namespace
 
+bool contradicted(const std::vector<double>& before, const std::vector<double>& after) {
+  double gained = 0, lost = 0;
+  for (std::size_t c = 0; c < before.size(); ++c)
+    (after[c] < before[c] ? gained : lost) += std::abs(before[c] - after[c]);
+  return lost > kContradicted * gained;
+}
+
 FittedMachine learned(const Evidence& evidence, const FittedMachine& at, const Machine& machine) {
   FittedMachine now = at;
   now.machine = machine;
@@ -115,23 +127,30 @@ double to_take_away(const Named& named, double needed) {
 std::string words_of(const Law& law) {
   constexpr const char* points[] = {"command", "command time", "motor force",
                                     "force",   "displacement", "reading"};
-  constexpr const char* letters[] = {"t", "q", "v", "a", "sgn v"};
+  constexpr const char* letters[] = {"t", "q", "v", "a"};
   const auto named = [&](Covariate c, Law::OfAxis axis) -> std::string {
     if (c == Covariate::time) return "t";
     return fmt::format("{}_{}", letters[static_cast<int>(c)],
                        kAxisNames[static_cast<std::size_t>(axis)]);
   };
-  std::string factor;
+  std::string factor, way;
   if (law.times == Covariate::sign)
     factor = fmt::format("sgn(v_{}) ", kAxisNames[static_cast<std::size_t>(law.times_axis)]);
-  else if (law.times != Covariate::time)
+  else if (law.grows())
     factor = named(law.times, law.times_axis) + " ";
+  else if (law.times != Covariate::time)
+    way = fmt::format(
+        " {}going {}",
+        law.times_axis == law.axis
+            ? ""
+            : fmt::format("with {} ", kAxisNames[static_cast<std::size_t>(law.times_axis)]),
+        law.times == Covariate::forwards ? "forwards" : "backwards");
   if (law.jumps())
     return fmt::format("{} on {} that jumps at {:.2f} s of the run",
                        points[static_cast<int>(law.point)], kAxisNames[law.axis_index()],
                        law.at.back());
-  return fmt::format("{} on {} as {}f({})", points[static_cast<int>(law.point)],
-                     kAxisNames[law.axis_index()], factor, named(law.over, law.over_axis));
+  return fmt::format("{} on {}{} as {}f({})", points[static_cast<int>(law.point)],
+                     kAxisNames[law.axis_index()], way, factor, named(law.over, law.over_axis));
 }
 
 LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& doubt,
@@ -142,10 +161,12 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
   const auto linear = std::make_shared<const LinearPart>(at.linear());
   const Ground ground(evidence, at.residual, *linear);
   const double excess = std::max(1.0, ground.held_out - evidence.count(Role::held_out));
-  const Ranked all = ranked(evidence, columns, ground, excess, options.law_gain,
+  const Column left = less(at.residual, linear->columns, ground.step);
+  const Ranked all = ranked(evidence, columns, ground, left, excess, options.law_gain,
                             std::max(options.law_gain, least / kMoreByKnots));
   if (all.fits.empty() || kMoreInTheLoop * all.fits[all.order.front()].gain < least) return none;
   const auto counted_of = [&](const LawInLoop& law) {
+    if (contradicted(ground.held_out_of, law.ground().held_out_of)) return 0.0;
     return counted(ground.held_out - law.ground().held_out, ground.held_out_of,
                    law.ground().held_out_of, doubt);
   };

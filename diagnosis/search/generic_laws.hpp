@@ -4,8 +4,9 @@
 //   y = a before an instant, b after it: what slips, once
 //
 // at a point of an axis (model/effects/law.hpp): force on the table, displacement of the tool
-// centre, reading of the probe. m is 1, a sign of the velocity or a position. All are fitted to
-// first order (law_columns.hpp) with ten hats each; the best ones that are no laws of time get more
+// centre, reading of the probe. m is 1, a sign of the velocity, one direction or a position. All
+// are fitted to first order (law_columns.hpp) with ten hats each, and with narrow ones at the place
+// of a travel that promises most (law_places.hpp); the best ones that are no laws of time get more
 // where held-out laps ask for them (law_knots.hpp). The best few are then simulated themselves and
 // the best of these is fitted again where it acts (Gauss-Newton); what it gains there on the
 // held-out laps counts.
@@ -34,6 +35,11 @@ struct LawFit {
 /// simulated whose columns promise far less.
 LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& doubt,
                 const DiagnosisOptions& options, double least = 0);
+
+/// Whether of what a law gains in some channels a twentieth is lost in others, by chi-square of
+/// each before and after: a force that winds up a shaft by what the other measuring system slips,
+/// and that no motor has felt.
+bool contradicted(const std::vector<double>& before, const std::vector<double>& after);
 
 /// `at` as it stands with laws that were learnt on what it leaves, all its numbers fitted again.
 FittedMachine learned(const Evidence& evidence, const FittedMachine& at, const Machine& machine);

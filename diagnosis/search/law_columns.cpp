@@ -80,7 +80,7 @@ std::vector<Law> LawColumns::all() const {
     using enum Covariate;
     for (const Point point : {Point::table_force, Point::displacement}) {
       add(point, position, i, time);
-      add(point, position, i, sign);
+      for (const Covariate way : {sign, forwards, backwards}) add(point, position, i, way);
       add(point, velocity, i, time);
       add(point, acceleration, i, time);
       add(point, time, i, time);
@@ -162,6 +162,10 @@ double LawColumns::covariate(Covariate c, Law::OfAxis axis, std::size_t k) const
       return of.acceleration[k];
     case Covariate::sign:
       return of.velocity[k] > 0 ? 1 : of.velocity[k] < 0 ? -1 : 0;
+    case Covariate::forwards:
+      return of.velocity[k] > 0 ? 1 : 0;
+    case Covariate::backwards:
+      return of.velocity[k] < 0 ? 1 : 0;
     case Covariate::time:
       break;
   }

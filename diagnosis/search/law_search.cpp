@@ -19,6 +19,9 @@ constexpr double kImitated = 0.02;
 /// and how many there are at most.
 constexpr double kLeftByLaws = 0.1, kMostOfIt = 0.5;
 constexpr std::size_t kMostLaws = 3;
+/// Part of all that there was that a law beside names must take: less, and it is what their models
+/// are wrong by.
+constexpr double kOfAll = 0.01;
 
 std::string all_names(const FittedMachine& found, const std::vector<Candidate>& candidates) {
   std::string names;
@@ -52,6 +55,8 @@ class LawSearch {
       law = std::move(*instead);
     }
     if (law.gain < needed || (quiet && !told.instead)) return {};
+    const bool beside_names = found().found() > 0 && !told.instead;
+    if (beside_names && law.gain < kOfAll * excess(selection_.base.held_out)) return {};
     add_further(law, told.instead);
     told.laws = std::move(law.laws);
     told.machine = std::move(law.machine);

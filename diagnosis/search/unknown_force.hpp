@@ -11,10 +11,10 @@
 // in turns from nought, e_F and e_x what force and position are off the model under F, J the
 // inertia of the axis: the force that is missing for it to move as it did, whatever its controller
 // does. Where the axis stands, as before. It is believed where it stands out of the noise and the
-// turns come to an end: half of it at most is left. None is found where no force is recorded or
-// where the record has a known force. Where a hypothesis has more dry friction, it grows as that
-// does: it is what that law has wrong. Known to 5 %, what is slow of it and what is quick each for
-// itself.
+// turns come to an end: half of its mean square at most is left. None is found where no force is
+// recorded or where the record has a known force. Where a hypothesis has more dry friction, it
+// grows as that does: it is what that law has wrong. Known to 5 %, what is slow of it and what is
+// quick each for itself.
 #pragma once
 
 #include <vector>

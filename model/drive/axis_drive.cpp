@@ -122,6 +122,7 @@ AxisDriveOf<Real>::AxisDriveOf(const AxisParams& declared, const AxisParams& act
   lag_share_ = servo.current_lag > 0 ? -std::expm1(-kPlantTime / servo.current_lag) : 1;
   position_share_ = share_of(actual.servo.position_lag);
   velocity_share_ = share_of(actual.servo.velocity_lag);
+  feedforward_share_ = share_of(actual.servo.feedforward_lag);
 }
 
 template <class Real>
@@ -316,7 +317,8 @@ void AxisDriveOf<Real>::follow_up() {
   const Real measured = encoder(feedback_);
   const Real told = setpoint_.velocity, seen = observer_.velocity();
   setpoint_ = last_raw_ = last_shaped_ = {measured, choose(abs(seen) < abs(told), seen, told)};
-  position_error_ = 0.0;
+  position_error_ = acceleration_told_ = 0.0;
+  velocity_told_ = setpoint_.velocity;
 }
 
 template <class Real>
@@ -397,11 +399,13 @@ Real AxisDriveOf<Real>::control(const Setpoint& now, const Setpoint& next) {
   using std::max, std::min;
   const Real measured = encoder(feedback_);
   position_error_ = lagged(position_error_, now.position - measured, position_share_);
-  const Real v_ref = servo_.kv * position_error_ + servo_.velocity_ff * now.velocity;
+  velocity_told_ = lagged(velocity_told_, now.velocity, feedforward_share_);
+  const Real v_ref = servo_.kv * position_error_ + servo_.velocity_ff * velocity_told_;
   velocity_ = lagged(velocity_, observer_.velocity(), velocity_share_);
   const Real error = v_ref - velocity_;
   const Real a_c = (next.velocity - now.velocity) / kDriveLoopTime;
-  Real force = kp_ * error + integral_ + servo_.acceleration_ff * inertia_ * a_c;
+  acceleration_told_ = lagged(acceleration_told_, a_c, feedforward_share_);
+  Real force = kp_ * error + integral_ + servo_.acceleration_ff * inertia_ * acceleration_told_;
   if (force_known_) force += known(&KnownForce::added, loop_);
   const Real limited = min(max(force, -servo_.force_limit), servo_.force_limit);
   integral_ = choose(force == limited,

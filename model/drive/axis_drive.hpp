@@ -5,10 +5,10 @@
 // ends), so that velocity and acceleration feed-forward are smooth.
 //
 // Every 100 us (loop step, T), at its instant t:
-//   v_ref = Kv e + kvff v_c,   e: x_c - x_m behind a first-order lag tau_x
-//   F_ref = Kp (v_ref - v) + (Kp/Ti) int (v_ref - v) dt + kaff J a_c + F_a
+//   v_ref = Kv e + kvff v_f,   e: x_c - x_m behind a first-order lag tau_x
+//   F_ref = Kp (v_ref - v) + (Kp/Ti) int (v_ref - v) dt + kaff J a_f + F_a
 //   |F_ref| <= F_max; the integral is held while the force is limited
-//   v:    v_m behind a lag tau_v
+//   v:    v_m behind a lag tau_v;   v_f, a_f: v_c and a_c behind a lag tau_f
 //   Kp    = 2 pi f_v J,  J = load + reflected motor inertia
 //   a_c   = (v_c(t + T) - v_c(t)) / T, the acceleration that the coming step needs on average
 //   F_a:  what somebody adds to the demand, a straight line over the bus cycle
@@ -280,7 +280,7 @@ class AxisDriveOf {
   Real motor_inertia_, load_inertia_;
   Real plant_mobility_, motor_mobility_, load_mobility_;  ///< plant step / inertia
   ServoPort::Signal<Real> servo_;
-  Real kp_{}, lag_share_{}, position_share_{}, velocity_share_{};
+  Real kp_{}, lag_share_{}, position_share_{}, velocity_share_{}, feedforward_share_{};
   bool two_masses_ = false;
   Real stiffness_{}, damping_{}, half_gap_{};
   bool uneven_ = false;
@@ -307,7 +307,8 @@ class AxisDriveOf {
   int plant_step_ = 0;
   double encoder_shift_ = 0;
   Real x_load_, v_load_{}, a_load_{}, x_motor_, v_motor_{};
-  Real position_error_{}, velocity_{}, force_ref_{}, force_{}, integral_{}, load_force_{};
+  Real position_error_{}, velocity_{}, velocity_told_{}, acceleration_told_{}, force_ref_{},
+      force_{}, integral_{}, load_force_{};
   Setpoint last_raw_, last_shaped_;
   AxisVector told_position_{}, told_velocity_{}, before_position_{}, before_velocity_{};
   bool force_known_ = false;  ///< tell_force() was called
@@ -325,9 +326,10 @@ class AxisDriveOf {
                  plant_mobility_, motor_mobility_, load_mobility_, servo_.kv, servo_.velocity_gain,
                  servo_.integral_time, servo_.velocity_ff, servo_.acceleration_ff,
                  servo_.current_lag, servo_.force_limit, kp_, lag_share_, position_share_,
-                 velocity_share_, stiffness_, damping_, half_gap_, wave_, wave_number_, wave_phase_,
-                 motor_dry_, motor_viscous_, x_load_, x_motor_, last_raw_.position,
-                 last_raw_.velocity, last_shaped_.position, last_shaped_.velocity),
+                 velocity_share_, feedforward_share_, stiffness_, damping_, half_gap_, wave_,
+                 wave_number_, wave_phase_, motor_dry_, motor_viscous_, x_load_, x_motor_,
+                 last_raw_.position, last_raw_.velocity, last_shaped_.position,
+                 last_shaped_.velocity),
         observer_.numbers());
   }
 };

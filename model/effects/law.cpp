@@ -25,6 +25,10 @@ double Law::operator()(double t, const Motions<double>& axes) const {
         return m.acceleration;
       case Covariate::sign:
         return m.velocity > 0 ? 1.0 : m.velocity < 0 ? -1.0 : 0.0;
+      case Covariate::forwards:
+        return m.velocity > 0 ? 1.0 : 0.0;
+      case Covariate::backwards:
+        return m.velocity < 0 ? 1.0 : 0.0;
       case Covariate::time:
         break;
     }
@@ -32,6 +36,11 @@ double Law::operator()(double t, const Motions<double>& axes) const {
   };
   const double factor = times == Covariate::time ? 1 : read(times, times_axis);
   return factor * function(read(over, over_axis));
+}
+
+bool Law::grows() const {
+  return times == Covariate::position || times == Covariate::velocity ||
+         times == Covariate::acceleration;
 }
 
 bool Law::jumps() const {

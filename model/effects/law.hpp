@@ -4,7 +4,8 @@
 //   y = m * f(c)
 //   f  piecewise linear through (at, value), constant beyond its ends
 //   c  covariate: time, or position, velocity, acceleration of an axis
-//   m  1, or the sign, position, velocity or acceleration of an axis (its value in SI)
+//   m  1, or the sign, position, velocity or acceleration of an axis (its value in SI), or 1 while
+//      it goes forwards (backwards) and 0 else
 //
 //   point          y is                                          unit (linear, rotary)
 //   command        added to the set-point of the loops           um, arcsec
@@ -32,7 +33,7 @@
 namespace vcnc {
 
 /// What a law may depend on.
-enum class Covariate { time, position, velocity, acceleration, sign };
+enum class Covariate { time, position, velocity, acceleration, sign, forwards, backwards };
 
 struct Law {
   enum class Point { command, command_time, motor_force, table_force, displacement, reading };
@@ -41,7 +42,7 @@ struct Law {
   std::string label;  ///< for people
   OfAxis axis = OfAxis::X;
   Point point = Point::table_force;
-  Covariate over = Covariate::time;  ///< not sign
+  Covariate over = Covariate::time;  ///< not a direction
   OfAxis over_axis = OfAxis::X;
   Covariate times = Covariate::time;  ///< time: no factor
   OfAxis times_axis = OfAxis::X;
@@ -68,13 +69,16 @@ struct Law {
                   {"acceleration", acceleration}},
                  "what the law is a function of");
     axis_field("over_axis", p.over_axis, visit, "of which axis");
-    visit.choice("times", p.times,
-                 {{"one", time},
-                  {"sign", sign},
-                  {"position", position},
-                  {"velocity", velocity},
-                  {"acceleration", acceleration}},
-                 "a factor: the sign of the velocity, or a value in m, m/s, rad, ...");
+    visit.choice(
+        "times", p.times,
+        {{"one", time},
+         {"sign", sign},
+         {"position", position},
+         {"velocity", velocity},
+         {"acceleration", acceleration},
+         {"forwards", forwards},
+         {"backwards", backwards}},
+        "a factor: the sign of the velocity, 1 one way only, or a value in m, m/s, rad, ...");
     axis_field("times_axis", p.times_axis, visit, "of which axis");
     const Unit x = unit_of(p.over, rotary(p.over_axis)), y = unit_of(p.point, rotary(p.axis));
     visit("at_" + std::string(x.suffix), p.at, x, Range{-1e9, 1e9}, "knots, ascending");
@@ -86,6 +90,8 @@ struct Law {
   double function(double c) const;
   /// y for the motions of all axes at time t [s].
   double operator()(double t, const Motions<double>& axes) const;
+  /// Whether the factor is a value, in SI.
+  bool grows() const;
   /// From one value to another within 10 ms, once.
   bool jumps() const;
   /// Empty, or what is wrong with it in one sentence.

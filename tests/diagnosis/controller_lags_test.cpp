@@ -28,10 +28,30 @@ TEST(ControllerLags, AreToldWhateverFrictionIsLike) {
   }
 }
 
+/// A feed-forward of differences of set-points comes late: what is late beyond the measured
+/// velocity is what moves the axis.
+TEST(ControllerLags, TellALateFeedForward) {
+  for (const double of_velocity : {0.0, 200.0}) {
+    Machine machine = later(0, of_velocity);
+    machine.effects.deviations.push_back({"axes.X.feedforward_lag_us", 500});
+    const ServoParams found = with_lags_of(recorded(machine, 4), declared()).axes[kX].servo;
+    EXPECT_NEAR(1e6 * (found.feedforward_lag - found.velocity_lag), 500 - of_velocity, 25);
+  }
+}
+
 TEST(ControllerLags, StayAsDeclaredWhereNothingIsLater) {
   const Machine found = with_lags_of(recorded(later(0, 0), 2), declared());
-  EXPECT_EQ(found.axes[kX].servo.position_lag, 0);
-  EXPECT_EQ(found.axes[kX].servo.velocity_lag, 0);
+  for (const LoopLag& lag : kLoopLags) EXPECT_EQ(found.axes[kX].servo.*lag.value, 0) << lag.key;
+}
+
+TEST(ControllerLags, AreToldWhereTheyAreOthers) {
+  ServoParams was, is;
+  EXPECT_EQ(told_lags(was, is), "");
+  is.velocity_lag = 0.25e-3;
+  is.feedforward_lag = 2e-3;
+  EXPECT_EQ(
+      told_lags(was, is),
+      "the measured velocity 0 -> 250 us, the feed-forward 0 -> 2000 us (none longer is sought)");
 }
 
 TEST(ControllerLags, AreNotAskedForWithoutAForceNorOfASampledController) {

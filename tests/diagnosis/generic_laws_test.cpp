@@ -45,6 +45,12 @@ TEST(GenericLaws, NamesStayOrGo) {
   EXPECT_EQ(judged(30, 0, three, 40, true), Names::stay);
 }
 
+TEST(GenericLaws, AreContradictedByWhatTheyMakeWorse) {
+  EXPECT_TRUE(contradicted({1000, 10}, {100, 110}));
+  EXPECT_FALSE(contradicted({1000, 10}, {100, 30}));
+  EXPECT_FALSE(contradicted({1000, 10}, {100, 10}));
+}
+
 /// What is gained by hats on these knots and besides, of a function over 0 to 1 that is known at
 /// 2000 places to one in a hundred.
 std::function<double(const std::vector<Hat>&)> gain_of(const std::vector<double>& knots,

@@ -242,6 +242,29 @@ TEST(Law, SignOfTheVelocityTimesAFunctionOfThePosition) {
   EXPECT_NEAR(force_at(0e-3, -0.02), -100, 0.01);
 }
 
+TEST(Law, OneWayOnly) {
+  for (const auto& [way, forwards, backwards] :
+       {std::tuple{"forwards", 100.0, 0.0}, {"backwards", 0.0, 100.0}}) {
+    const Machine machine = with_law(
+        fmt::format("axis = \"X\"\npoint = \"table_force\"\nat_s = [0, 1]\nvalue_N = [-100, "
+                    "-100]\ntimes = \"{}\"\ntimes_axis = \"X\"\n",
+                    way));
+    AxisDrive drive(machine, kX, 1);
+    double position = 0, force = 0;
+    for (int k = 0; k < 500; ++k) {
+      position += 0.02 * kCycleTime;
+      force = drive.follow({position, 0.02}).force;
+    }
+    EXPECT_NEAR(force * 4e4, forwards, 0.01) << way;
+    drive.hold();
+    for (int k = 0; k < 500; ++k) {
+      position -= 0.02 * kCycleTime;
+      force = drive.follow({position, -0.02}).force;
+    }
+    EXPECT_NEAR(force * 4e4, backwards, 0.01) << way;
+  }
+}
+
 /// The drive of X hears where Y is commanded to be.
 TEST(Law, AnotherAxisAsCovariate) {
   const Machine machine = with_law(

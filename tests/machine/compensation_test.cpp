@@ -397,6 +397,14 @@ TEST(CompensationFor, ALawOverAPositionIsATable) {
   EXPECT_EQ(table.over_index(), kY);
   EXPECT_EQ(table.error, law.value);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(table.error_reverse[i], -law.value[i]);
+  // One way only: nothing the other way.
+  const std::vector<double> none(3, 0.0);
+  for (const bool forwards : {true, false}) {
+    machine.effects.laws[0].times = forwards ? Covariate::forwards : Covariate::backwards;
+    const CompensationTable one_way = compensation_for(machine).settings.tables.at(0);
+    EXPECT_EQ(one_way.error, forwards ? law.value : none);
+    EXPECT_EQ(one_way.error_reverse, forwards ? none : law.value);
+  }
 }
 
 /// The pulse of the closed form against the friction step it is meant for: the integral over it is

@@ -251,6 +251,23 @@ TEST(AxisDrive, VelocityLagPutsTheAxisAheadWhileItAccelerates) {
   const double without = ahead();
   params.servo.velocity_lag = 0.0005;
   EXPECT_NEAR(ahead() - without, a * 0.0005 / 40, 0.02 * a * 0.0005 / 40);
+  // Feed-forward that is as late takes that back, and alone puts the axis behind by as much.
+  params.servo.feedforward_lag = 0.0005;
+  EXPECT_NEAR(ahead() - without, 0, 0.02 * a * 0.0005 / 40);
+  params.servo.velocity_lag = 0;
+  EXPECT_NEAR(ahead() - without, -a * 0.0005 / 40, 0.02 * a * 0.0005 / 40);
+}
+
+TEST(AxisDrive, AFeedForwardLagChangesNothingAtConstantSpeed) {
+  AxisParams params = axis(40, 1, 1);
+  const auto behind = [&] {
+    AxisDrive drive(params);
+    AxisCycle cycle;
+    for (int k = 1; k <= 1000; ++k) cycle = drive.follow({0.1 * kCycle * k, 0.1});
+    return 0.1 * kCycle * 1000 - cycle.truth.back();
+  };
+  params.servo.feedforward_lag = 0.001;
+  EXPECT_NEAR(behind(), 0, 1e-9);
 }
 
 // At constant speed against viscous friction the spring carries F = B v and winds up by F / K.
