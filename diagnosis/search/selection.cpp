@@ -25,6 +25,8 @@ constexpr double kMostLeft = 0.1;  ///< part of what was to be explained, to loo
 constexpr double kHalf = 0.5;  ///< of what is left: for a further effect than few, or another one
 /// Times what two effects of one place make together that each makes and the other takes back.
 constexpr double kCancels = 25;
+/// Part of what two effects make together that the smaller one must make, to be one of two.
+constexpr double kOneOfTwo = 0.01;
 constexpr double kUnlikely = 3;          ///< pull of a declared number
 constexpr double kAtTheEnd = 2;          ///< times the least that a shape may be
 constexpr double kClearlySimpler = 0.5;  ///< numbers
@@ -103,15 +105,19 @@ class Search {
     values_.erase(values_.begin() + 1, values_.end());
     evidence_.anchor(now.machine);
     if (!accept_one(now, now, contenders, first)) return now;
+    Found before;
     while (going_) {
       now.rounding = rounding_of(now);
       look_again(now);
       exchange(now);
+      join(now);
       for (std::size_t i = 0; i < now.added.size(); ++i)
         if (now.added[i].acts.empty()) weigh(now, i);  // one that took a place
       now.rounding = rounding_of(now);
       ladder.push_back(step_of(now, ladder.size()));
       if (now.found() >= options_.max_effects) break;
+      if (found_in(now) == before) break;
+      before = found_in(now);
       if (imitates(now)) break;
       const FittedMachine from = within_tolerance(now);
       Contest contest(rules_, from);
@@ -195,17 +201,18 @@ class Search {
     return false;
   }
 
+  /// Candidates that were added, keys that were released.
+  using Found = std::pair<std::set<std::size_t>, std::set<std::string>>;
+  static Found found_in(const FittedMachine& m) {
+    Found found;
+    for (const AddedEffect& e : m.added) found.first.insert(e.candidate);
+    for (const ReleasedNumber& r : m.released) found.second.insert(r.key);
+    return found;
+  }
   /// Whether the same was found in both: what was added to what `from` held back went again when
   /// declared numbers were pulled once more.
   static bool says_the_same(const FittedMachine& a, const FittedMachine& b) {
-    const auto found = [](const FittedMachine& m) {
-      std::set<std::size_t> added;
-      std::set<std::string> released;
-      for (const AddedEffect& e : m.added) added.insert(e.candidate);
-      for (const ReleasedNumber& r : m.released) released.insert(r.key);
-      return std::pair(added, released);
-    };
-    return found(a) == found(b);
+    return found_in(a) == found_in(b);
   }
 
   /// Whether its effects are told by what else is known of them than what they explain together.
@@ -659,6 +666,40 @@ class Search {
       rivals.erase(better);
     }
     return effect && exchange_for_as_good(m, i, less, rivals, contest, lost);
+  }
+
+  /// Two effects of one place of which another one does all, but for what a model of it may be
+  /// wrong by, are that one: errors of two measuring systems that leave what the one has against
+  /// the other. The smaller one must make more than that is.
+  void join(FittedMachine& m) {
+    for (std::size_t i = 0; i < m.added.size(); ++i)
+      for (std::size_t j = i + 1; j < m.added.size() && going_; ++j)
+        if (candidates_[m.added[i].candidate].place == candidates_[m.added[j].candidate].place &&
+            became_one(m, i, j))
+          return;
+  }
+
+  bool became_one(FittedMachine& m, std::size_t i, std::size_t j) {
+    const FittedMachine less = taken_out(taken_out(m, j, Common::free), i, Common::free);
+    const Contest contest(rules_, less);
+    const double lost = contest.held_out() - m.held_out,
+                 wrong = std::max(options_.class_gain, options_.share_of_found * lost);
+    if (std::min(m.added[i].gain, m.added[j].gain) < std::max(kOneOfTwo * lost, 2 * wrong))
+      return false;
+    for (const Contender& r : contest.rivals(kNearLoss * lost, candidates_.size())) {
+      if (!r.released.empty() || r.candidate == m.added[i].candidate ||
+          r.candidate == m.added[j].candidate)
+        continue;
+      FittedMachine instead = less;
+      add(instead, r, {}, far_more_than(m));
+      if (instead.held_out - m.held_out > wrong || !holds_up(instead) || !is_certain(instead))
+        continue;
+      m = std::move(instead);
+      exchange(m);
+      return true;
+    }
+    evidence_.anchor(m.machine);
+    return false;
   }
 
   static const FreedNumber& number_of_key(const FittedMachine& m, const std::string& key) {

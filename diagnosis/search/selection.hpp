@@ -8,6 +8,7 @@
 //     accept                 the one with the largest gain on held-out laps, if it is enough
 //     converge, drop test    all together; what is no longer needed goes
 //     exchange               each one taken out, all candidates and declared numbers compete
+//     join                   two of one place taken out, and one that does as much found
 //   begin otherwise          where much is left: with another of the first contenders
 //
 // Where names leave more than a tenth, a law without a name (generic_laws.hpp) is fitted alone. The
