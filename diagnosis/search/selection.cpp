@@ -687,7 +687,7 @@ class Search {
     if (std::min(m.added[i].gain, m.added[j].gain) < std::max(kOneOfTwo * lost, 2 * wrong))
       return false;
     for (const Contender& r : contest.rivals(kNearLoss * lost, candidates_.size())) {
-      if (!r.released.empty() || r.candidate == m.added[i].candidate ||
+      if (!r.released.empty() || r.gain < kAsGood * lost || r.candidate == m.added[i].candidate ||
           r.candidate == m.added[j].candidate)
         continue;
       FittedMachine instead = less;
