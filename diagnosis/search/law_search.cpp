@@ -21,7 +21,7 @@ constexpr double kLeftByLaws = 0.1, kMostOfIt = 0.5;
 constexpr std::size_t kMostLaws = 3;
 /// Part of all that there was that a law beside names must take: less, and it is what their models
 /// are wrong by.
-constexpr double kOfAll = 0.01;
+constexpr double kOfAll = 0.005;
 
 std::string all_names(const FittedMachine& found, const std::vector<Candidate>& candidates) {
   std::string names;

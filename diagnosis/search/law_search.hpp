@@ -1,8 +1,8 @@
 // Laws without names: beside what names explain, or in place of all of them.
 //
-//   a law beside          is told where it gains what an effect must, and a hundredth of all there
-//   was a law in their place  takes the names away where it does clearly more than one of them,
-//   more
+//   a law beside          is told where it gains what an effect must, and half a percent of all
+//   there was a law in their place  takes the names away where it does clearly more than one of
+//   them, more
 //                         than two, or as much as three (takes_names_away()), or where more names
 //                         than a machine changes in between two runs leave something
 //   further laws          where the laws so far leave a tenth of what there was and one more takes
