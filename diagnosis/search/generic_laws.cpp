@@ -33,6 +33,7 @@ constexpr double kWrongAboutOne = 0.05;
 /// Part of what the least of many names does that a law need not do.
 constexpr double kOfTheLeast = 0.1;
 constexpr double kNormal95 = 1.96;
+constexpr double kOneWay = 0.9;         ///< what a gain weighs of a law that acts one way only
 constexpr double kContradicted = 0.05;  ///< of a gain, that a law may lose elsewhere
 constexpr std::size_t kMostAlike = 5;   ///< that are named
 
@@ -84,6 +85,11 @@ Ranked ranked(const Evidence& evidence, const LawColumns& columns, const Ground&
   }
   all.sort();
   return all;
+}
+
+/// A law that nothing resists the other way must do clearly better than one of both.
+bool acts_one_way(const Law& law) {
+  return law.times == Covariate::forwards || law.times == Covariate::backwards;
 }
 
 /// Those that do as well by their columns.
@@ -170,20 +176,23 @@ LawFit best_law(const Evidence& evidence, const FittedMachine& at, const Doubt& 
     return counted(ground.held_out - law.ground().held_out, ground.held_out_of,
                    law.ground().held_out_of, doubt);
   };
+  const auto weight_of = [&](const LawInLoop& law) {
+    return (acts_one_way(law.law()) ? kOneWay : 1) * counted_of(law);
+  };
   // The columns are a linearisation; the first few are asked what they do in the loop.
   std::vector<LawInLoop> simulated;
   for (std::size_t rank = 0; rank < std::min(kSimulated, all.order.size()); ++rank)
     if (all.fits[all.order[rank]].gain >= options.law_gain)
       simulated.emplace_back(evidence, at, all.at_rank(rank), linear);
   std::stable_sort(simulated.begin(), simulated.end(),
-                   [&](const auto& x, const auto& y) { return counted_of(x) > counted_of(y); });
+                   [&](const auto& x, const auto& y) { return weight_of(x) > weight_of(y); });
   const LawInLoop* best = nullptr;
-  const double most = simulated.empty() ? 0 : counted_of(simulated.front());
+  const double most = simulated.empty() ? 0 : weight_of(simulated.front());
   for (std::size_t i = 0; i < std::min(kRefined, simulated.size()); ++i) {
     LawInLoop& law = simulated[i];
-    if (!(counted_of(law) > 0) || counted_of(law) < kNearlyBest * most) break;
+    if (!(weight_of(law) > 0) || weight_of(law) < kNearlyBest * most) break;
     law.refine();
-    if (!best || counted_of(law) > counted_of(*best)) best = &law;
+    if (!best || weight_of(law) > weight_of(*best)) best = &law;
   }
   if (!best) return none;
 

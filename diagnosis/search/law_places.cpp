@@ -14,11 +14,11 @@ constexpr std::size_t kWidest = 10;  // of these: more, and ten hats over the tr
 constexpr double kBelongs = 0.05;    // part of the largest promise
 
 /// Products of the residual with what a hat changes, and of that with itself.
-struct Shown {
+struct HatProducts {
   double with_residual = 0, own = 0;
 
   double promise() const { return own > 0 ? with_residual * with_residual / own : 0; }
-  Shown plus(const Shown& other, double sign) const {
+  HatProducts plus(const HatProducts& other, double sign) const {
     return {with_residual + sign * other.with_residual, own + other.own};
   }
 };
@@ -32,9 +32,10 @@ std::vector<double> fine_knots(const Law& over_all) {
 }
 
 /// Of the hats at all knots but the ends.
-std::vector<Shown> shown(const Evidence& evidence, const LawColumns& columns, Law law,
-                         const std::vector<double>& knots, const Column& left) {
-  std::vector<Shown> all;
+std::vector<HatProducts> products_of_hats(const Evidence& evidence, const LawColumns& columns,
+                                          Law law, const std::vector<double>& knots,
+                                          const Column& left) {
+  std::vector<HatProducts> all;
   law.value = {0, 1, 0};
   for (std::size_t i = 1; i + 1 < knots.size(); ++i) {
     law.at = {knots[i - 1], knots[i], knots[i + 1]};
@@ -81,13 +82,14 @@ std::vector<Law> laws_of_places(const Evidence& evidence, const LawColumns& colu
   parallel_for(over_all.size(), [&](std::size_t l) {
     Law law = over_all[l];
     const std::vector<double> knots = fine_knots(law);
-    const std::vector<Shown> forwards = shown(evidence, columns, law, knots, left);
+    const std::vector<HatProducts> forwards = products_of_hats(evidence, columns, law, knots, left);
     law.times = Covariate::backwards;
-    const std::vector<Shown> backwards = shown(evidence, columns, law, knots, left);
+    const std::vector<HatProducts> backwards =
+        products_of_hats(evidence, columns, law, knots, left);
     std::array<std::vector<double>, 4> promises;
     for (std::size_t i = 0; i < forwards.size(); ++i) {
-      const Shown &f = forwards[i], &b = backwards[i];
-      const std::array<Shown, 4> of{f, b, f.plus(b, 1), f.plus(b, -1)};
+      const HatProducts &f = forwards[i], &b = backwards[i];
+      const std::array<HatProducts, 4> of{f, b, f.plus(b, 1), f.plus(b, -1)};
       for (std::size_t w = 0; w < of.size(); ++w) promises[w].push_back(of[w].promise());
     }
     constexpr std::array kWays{Covariate::forwards, Covariate::backwards, Covariate::time,
