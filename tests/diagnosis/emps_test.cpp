@@ -7,9 +7,11 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <set>
 #include <string>
 
 #include "configs/config.hpp"
+#include "diagnosis/diagnose.hpp"
 #include "diagnosis/records/import_table.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
 #include "diagnosis/search/chatter_search.hpp"
@@ -154,6 +156,26 @@ TEST_F(Emps, NothingThatWasFoundIsIdle) {
   EXPECT_GT(without(CableChain{}), best + 0.02);
   EXPECT_GT(without(TorqueRipple{}), best + 0.02);
   EXPECT_GT(without(FrictionZone{}), best + 0.02);
+}
+
+// From the published model and the record alone (docs/emps.md).
+TEST_F(Emps, DiagnosisFindsWhatIsMissing) {
+  const Machine declared = load_machine(kPublished);
+  MachineReplica replica(record_, declared, {});
+  const Diagnosis d = diagnose({record_, replica, declared, candidates(declared)});
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::partly);
+  std::set<std::string> names;
+  for (const FoundEffect& e : d.effects) names.insert(e.name == "deviation" ? e.place : e.name);
+  EXPECT_EQ(names, (std::set<std::string>{"grease_drag", "friction_asymmetry", "cable_chain",
+                                          "torque_ripple", "presliding", "axes.X.dead_time_ms",
+                                          "effects.X.coulomb.level_N"}));
+  ASSERT_EQ(d.laws.size(), 1U);
+  EXPECT_EQ(d.laws[0].words, "force on X as sgn(v_X) f(q_X)");
+  for (const SignalFigure& f : d.figures)
+    if (f.channel.kind == SignalKind::force && f.run == "held-out laps") {
+      EXPECT_NEAR(f.before, 3.75, 0.01);
+      EXPECT_LT(f.after, 1.0);
+    }
 }
 
 }  // namespace
