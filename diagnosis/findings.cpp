@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <set>
 #include <utility>
 
 #include "diagnosis/record_notes.hpp"
@@ -608,6 +609,17 @@ class Report {
     return of_.candidates[candidate].numbers[at->trial.directions.front().number];
   }
 
+  /// Whether a place is an axis of which the run holds no signal.
+  bool is_unseen_axis(const std::string& place) const {
+    const auto name = std::find(kAxisNames.begin(), kAxisNames.end(), place);
+    const auto axis = static_cast<std::size_t>(name - kAxisNames.begin());
+    const std::vector<MeasuredSignal>& signals = evidence_.record().signals;
+    return name != kAxisNames.end() &&
+           std::none_of(signals.begin(), signals.end(), [&](const MeasuredSignal& s) {
+             return !is_reading(s.kind) && s.axis == axis;
+           });
+  }
+
   void tell_excitation() {
     const auto& beside = selection_.beside_found;
     std::vector<double> alone;
@@ -622,8 +634,13 @@ class Report {
         finest = std::min(finest, 5 * std::sqrt(2.0) * evidence_.noise().channels[c].rms /
                                       of_.declared.probe.signal_period);
     if (finest < 1) d_.excitation.push_back({"probe.period_slip", finest, true, "", "", {}});
+    std::set<std::string> unseen;
     for (const auto& [c, limit] : limits) {
       const Candidate& candidate = of_.candidates[c];
+      if (is_unseen_axis(candidate.place)) {
+        unseen.insert(candidate.place);
+        continue;
+      }
       const FreeNumber& number = limited_number(c);
       double typical = std::abs(number.typical);
       for (std::size_t i = 0; i < candidate.numbers.size() && typical == 0; ++i)
@@ -637,7 +654,7 @@ class Report {
     }
     for (std::size_t i = 0; i < selection_.release_limits.size(); ++i) {
       const FreeNumber& n = selection_.base.nuisances.numbers[i].number;
-      if (is_clamping(n.key)) continue;
+      if (is_clamping(n.key) || is_unseen_axis(place_of_key(n.key))) continue;
       const std::string place = place_of_key(n.key), effect = effect_of_key(n.key);
       const double limit = selection_.release_limits[i];
       Excitation e{never_quite_absent(n.key) ? place + "." + effect : n.key,
@@ -650,6 +667,11 @@ class Report {
       if (beside) e.beside_found = beside->of_releases[i];
       d_.excitation.push_back(std::move(e));
     }
+    if (!unseen.empty())
+      d_.notes.push_back(fmt::format(
+          "The run holds no signal of {}, taken to stand where the model starts; what {} is not "
+          "listed with what this run could have shown.",
+          fmt::join(unseen, " and "), unseen.size() == 1 ? "that axis has" : "these axes have"));
   }
 
   void tell_figures() {

@@ -31,6 +31,31 @@ constexpr double kZeroApart = 20;      // times the span of a twist, that is non
 constexpr double kMostTwisted = 3e-3;  ///< [m or rad] that a transmission may be twisted by
 constexpr double kLeastMoved = 1e-3;   ///< [m or rad] of one encoder that the other one shows
 
+/// The unit of a column by the table itself, spelled as in maps: below its heading, or in brackets
+/// at its end, in UTF-8 or Latin-1. Empty: none, or none that maps have.
+std::string told_unit(const MeasuredColumn& column) {
+  std::string text = column.unit;
+  const std::size_t open = column.name.find_last_of("[(");
+  if (text.empty() && open != std::string::npos && !column.name.empty() &&
+      (column.name.back() == ']' || column.name.back() == ')'))
+    text = column.name.substr(open);
+  std::string unit;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const std::string_view two = std::string_view(text).substr(i, 2), one = two.substr(0, 1);
+    if (one == "\xb5")
+      unit += 'u';
+    else if (one == "\xb0")
+      unit += "deg";
+    else if (two == "\u00b5" || two == "\u03bc")
+      unit += 'u', ++i;
+    else if (two == "\u00b0")
+      unit += "deg", ++i;
+    else if (std::string_view("[]() ").find(text[i]) == std::string_view::npos)
+      unit += text[i];
+  }
+  return find_measured_unit(unit) ? unit : "";
+}
+
 class Importer {
  public:
   Importer(const MeasuredTable& table, const ImportMap& map, const std::string& map_name,
@@ -43,7 +68,7 @@ class Importer {
     record_.source = table_.source;
     record_.period = base_.period;
     record_.begin = base_.begin;
-    for (const std::string& note : table_.notes) warn(note);
+    tell_units();
     tell_time();
     if (base_.samples < kFewestSamples)
       throw MeasurementError(
@@ -92,6 +117,22 @@ class Importer {
       use(*columns_.back(), s.lines, "signals.", key,
           fmt::format("{}{}", to_string(s.kind), s.axis.empty() ? "" : " of " + s.axis));
     }
+  }
+
+  /// Units as the table has them that the map contradicts; a scale of the map's may convert them.
+  void tell_units() {
+    const auto tell = [&](const MeasuredColumn& column, const std::string& of_map) {
+      const MeasuredUnit *told = find_measured_unit(told_unit(column)),
+                         *taken = find_measured_unit(of_map);
+      if (told && taken && told != taken)
+        warn(fmt::format(
+            "column \"{}\" is in {} by the table and in {} by the map, which was followed",
+            column.name, told->name, of_map));
+    };
+    if (time_) tell(*time_, map_.time.unit);
+    for (const ImportMap::Signal& s : map_.signals)
+      if (s.scale == 1 && !s.unit.empty())
+        tell(*columns_[static_cast<std::size_t>(&s - map_.signals.data())], s.unit);
   }
 
   TimeBase find_time_base() const {

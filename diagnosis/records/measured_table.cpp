@@ -131,10 +131,7 @@ class TextTable {
     if (!begun_)
       begin();
     else if (!heading_rows_over_ && is_units())
-      table_.notes.push_back(
-          fmt::format("line {} holds no numbers and was taken for units, which "
-                      "come from the map",
-                      line_));
+      take_units();
     else
       take_row();
   }
@@ -253,6 +250,11 @@ class TextTable {
     const auto may_be = [&](const std::string& f) { return f == "1" || !number_of(f); };
     return std::any_of(fields_.begin(), fields_.end(), is_text) &&
            std::all_of(fields_.begin(), fields_.end(), may_be);
+  }
+
+  void take_units() {
+    for (std::size_t i = 0; i < std::min(fields_.size(), table_.columns.size()); ++i)
+      table_.columns[i].unit = fields_[i];
   }
 
   /// Whether the remark above the first row may name columns; then these are its fields.

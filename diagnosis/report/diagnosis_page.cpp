@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "analysis/html.hpp"
 #include "diagnosis/report/diagnosis_figures.hpp"
@@ -21,6 +22,7 @@ using namespace html;
 
 constexpr std::size_t kShownChannels = 6, kShownCovariates = 3;
 constexpr double kWorthShowing = 0.02;  ///< of the residual's variance
+constexpr double kStillOff = 1.5;       ///< times its noise
 
 constexpr const char* kDiagnosisStyle = R"(
 .verdict.good { --c: var(--pass); } .verdict.bad { --c: var(--fail); } .verdict.open { --c: var(--open); }
@@ -158,22 +160,22 @@ std::vector<std::size_t> shown_channels(const ModelResiduals& r) {
   return order;
 }
 
-std::string correlation_section(const DiagnosisStory& story,
-                                const std::vector<std::size_t>& channels) {
-  if (channels.empty()) return "";
+/// Of a channel that is off, or that still is when everything was added.
+enum class Off { before, after };
+
+std::string correlation_section(const DiagnosisStory& story, std::size_t c, Off when) {
   const ModelResiduals& r = story.residuals;
-  const std::size_t c = channels.front();
   const std::vector<RelatedQuantity> all = related_quantities(story.record);
   std::vector<std::pair<double, std::size_t>> shares;
   for (std::size_t i = 0; i < all.size(); ++i)
-    shares.emplace_back(explained_by(all[i], r.before[c]), i);
+    shares.emplace_back(explained_by(all[i], when == Off::before ? r.before[c] : r.after[c]), i);
   std::stable_sort(shares.begin(), shares.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   std::string text = fmt::format(
-      "<h2>What it goes along with</h2>\n<p>Share of the variance of {} that its means over a "
+      "<h2>What {} goes along with</h2>\n<p>Share of the variance of {} that its means over a "
       "quantity explain; going along is no cause.</p>\n<table><tr><th>quantity</th><th>before</th>"
       "<th>after</th></tr>\n",
-      channel_name(r.channels[c]));
+      when == Off::before ? "it" : "is left", channel_name(r.channels[c]));
   for (std::size_t i = 0; i < std::min<std::size_t>(shares.size(), 2 * kShownCovariates); ++i)
     text += fmt::format("<tr><td>{}</td><td>{:.1f} %</td><td>{:.1f} %</td></tr>\n",
                         escaped(all[shares[i].second].name), shares[i].first * 100,
@@ -186,6 +188,20 @@ std::string correlation_section(const DiagnosisStory& story,
                  fmt::format("Mean residual of {} over {}.", channel_name(r.channels[c]),
                              escaped(all[shares[i].second].name)));
   return text;
+}
+
+/// The channel that is most off in the end, of what noise makes of it on held-out laps.
+std::optional<std::size_t> still_off(const DiagnosisStory& story) {
+  std::optional<std::size_t> worst;
+  double most = kStillOff;
+  for (const SignalFigure& f : story.diagnosis.figures) {
+    const auto& channels = story.residuals.channels;
+    const auto at = std::find(channels.begin(), channels.end(), f.channel);
+    if (f.run != "held-out laps" || at == channels.end() || !(f.after > most * f.floor)) continue;
+    most = f.after / f.floor;
+    worst = static_cast<std::size_t>(at - channels.begin());
+  }
+  return worst;
 }
 
 std::string size_cell(const Excitation& e, double limit) {
@@ -271,7 +287,11 @@ std::string diagnosis_page(const DiagnosisStory& story) {
                    "Before: the declared machine. After: with what was found. Gaps are outside the "
                    "laps, or an axis at rest.");
   if (!d.figures.empty()) page += "<h2>Before and after</h2>\n" + figures_section(d.figures);
-  page += correlation_section(story, shown);
+  if (!shown.empty()) {
+    page += correlation_section(story, shown.front(), Off::before);
+    if (const auto left = still_off(story); left && *left != shown.front())
+      page += correlation_section(story, *left, Off::after);
+  }
   if (d.ladder.size() > 1)
     page += "<h2>One effect after the other</h2>\n" +
             figure(ladder_figure(d.ladder), "What is left of chi-square on what was held out.");

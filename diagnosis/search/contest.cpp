@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "diagnosis/search/needed_numbers.hpp"
 #include "diagnosis/search/parallel.hpp"
 #include "diagnosis/search/suspects.hpp"
 
@@ -26,13 +27,15 @@ constexpr double kChance = 3;          ///< standard deviations of a sum of squa
 constexpr double kOfTolerances = 0.3;  ///< numbers, for a decade of tolerances more
 constexpr double kMoreUsual = 0.2;     ///< numbers: a declared one by 50 tolerances
 constexpr double kNothing = 0.03;      ///< of a typical size
-constexpr double kPromise = 0.3;       ///< of what is needed: worth a refit
-constexpr double kHope = 0.5;          ///< of what is needed: worth to be refitted to the end
-constexpr double kLeaves = 0.05;       ///< part of what is left that a winner may leave
-constexpr double kNearly = 0.99;       ///< part of a gain that may be as much when all is refitted
-constexpr double kWorthAFit = 0.5;     ///< of another gain, that sensitivities must promise
-constexpr double kLongWay = 9;         ///< tolerances, where sensitivities are others
-constexpr double kMany = 3;            ///< numbers
+/// Chi-square, or part of what gains are alike by, for which a number may be as declared.
+constexpr double kNeedless = 12, kNeedlessPart = 0.1;
+constexpr double kPromise = 0.3;    ///< of what is needed: worth a refit
+constexpr double kHope = 0.5;       ///< of what is needed: worth to be refitted to the end
+constexpr double kLeaves = 0.05;    ///< part of what is left that a winner may leave
+constexpr double kNearly = 0.99;    ///< part of a gain that may be as much when all is refitted
+constexpr double kWorthAFit = 0.5;  ///< of another gain, that sensitivities must promise
+constexpr double kLongWay = 9;      ///< tolerances, where sensitivities are others
+constexpr double kMany = 3;         ///< numbers
 constexpr std::size_t kElsewhere = 2;
 constexpr std::size_t kLifted = 6;  ///< declared numbers in pairs
 constexpr std::size_t kFinalists = 3, kRivals = 4, kMoreRefits = 8;
@@ -185,7 +188,10 @@ std::vector<Contender> Contest::rivals(double least, std::size_t but) const {
   finish(all);
   for (Contender& c : releases(Released::anywhere, least))
     if (c.gain >= least) all.push_back(std::move(c));
-  for (Contender& c : all) c.counts = counts(c);
+  for (Contender& c : all) {
+    c.counts = counts(c);
+    find_needless(c);
+  }
   sort_by_worth(all);
   return all;
 }
@@ -206,6 +212,7 @@ double Contest::intricacy(const AddedEffect& effect) const {
   Contender same;
   same.candidate = effect.candidate;
   same.numbers = effect.numbers;
+  same.needless = effect.needless;
   return intricacy(same);
 }
 
@@ -281,6 +288,8 @@ std::vector<Screened> Contest::likes_of(const std::vector<Contender>& all,
 void Contest::put_simplest_first(std::vector<Contender>& all) const {
   if (all.empty()) return;
   const double most = all.front().counts, band = band_of(all.front().gain);
+  for (Contender& c : all)
+    if (c.counts > most - band) find_needless(c);
   // A number that is never quite absent is one of an effect: where that does as well with all its
   // numbers, it is told, so that what is known of one of them does not hang on the others'
   // defaults.
@@ -297,6 +306,36 @@ void Contest::put_simplest_first(std::vector<Contender>& all) const {
   std::rotate(all.begin(), simplest, simplest + 1);
 }
 
+std::set<std::string> Contest::needless_among(const std::vector<FreedNumber>& numbers,
+                                              const std::vector<Column>& columns,
+                                              double gain) const {
+  if (numbers.size() < 2 || columns.size() != numbers.size()) return {};
+  const std::vector<const Column*> own = pointers(columns);
+  const RoleGrams products = bordered(ground_.grams, rules_.evidence.cross(ground_.columns, own),
+                                      rules_.evidence.cross(own, own));
+  // Those that the effect replaces are none any more.
+  std::vector<FreedNumber> all;
+  std::vector<Eigen::Index> which;
+  std::vector<double> prior;
+  for (std::size_t i = 0; i < linear_.numbers.size() + numbers.size(); ++i) {
+    const bool linear = i < linear_.numbers.size();
+    const FreedNumber& n = linear ? linear_.numbers[i] : numbers[i - linear_.numbers.size()];
+    if (linear && has_key(numbers, n.number.key)) continue;
+    all.push_back(n);
+    which.push_back(static_cast<Eigen::Index>(i) + 1);
+    prior.push_back(linear ? ground_.precision[static_cast<Eigen::Index>(i)] : 0);
+  }
+  Eigen::MatrixXd information = products.fitted(which, which) + products.held_out(which, which);
+  information.diagonal() +=
+      Eigen::Map<const Eigen::VectorXd>(prior.data(), static_cast<Eigen::Index>(prior.size()));
+  return needless_of(numbers, all, information, now_.machine,
+                     std::max(kNeedless, kNeedlessPart * band_of(gain)));
+}
+
+void Contest::find_needless(Contender& c) const {
+  if (c.released.empty()) c.needless = needless_among(c.numbers, c.fit.columns, c.gain);
+}
+
 /// Numbers that are something, and two for every further tenth or tenfold of a usual size, or of a
 /// shape (a screw of 12 mm is no grating). Of declared numbers that do the same, the one by the
 /// fewest tolerances.
@@ -307,7 +346,7 @@ double Contest::intricacy(const Contender& c) const {
   for (const FreedNumber& n : c.numbers)
     for (const FreeNumber& own : rules_.candidates[c.candidate].numbers) {
       if (own.key != n.number.key || is_phase(own) || own.typical == 0) continue;
-      const double size = std::abs(n.value / own.typical);
+      const double size = c.needless.contains(own.key) ? 0 : std::abs(n.value / own.typical);
       if (!n.shape) {
         largest = std::max(largest, size);
         numbers -= size < kNothing;

@@ -24,6 +24,7 @@ struct Contender {
   std::size_t candidate = 0;
   Machine begun;  ///< what is refitted: the machine so far, with the whole numbers of the trials
   std::vector<FreedNumber> numbers;
+  std::set<std::string> needless;  ///< keys of those that may be as declared (needed_numbers.hpp)
   Refit fit;
   double gain = 0;
   double counts = 0;     ///< what of the gain counts (counted_gain.hpp)
@@ -90,6 +91,10 @@ class Contest {
   /// that is as far off as hardly any is.
   bool is_more_usual(const Contender& rival, const FreedNumber& number, double gain) const;
 
+  /// Keys of those numbers of an effect, with their columns, that may as well be as declared.
+  std::set<std::string> needless_among(const std::vector<FreedNumber>& numbers,
+                                       const std::vector<Column>& columns, double gain) const;
+
   /// How much it says: numbers that are something, and more where one is of an unusual size.
   double intricacy(const AddedEffect& effect) const;
   double intricacy(const Contender& contender) const;
@@ -127,6 +132,7 @@ class Contest {
   bool is_out_of_tolerance(const std::vector<FreedNumber>& numbers) const;
   void look_ahead(const std::vector<Screened>& screened, double numbers,
                   std::vector<Contender>& all) const;
+  void find_needless(Contender& contender) const;
   void put_simplest_first(std::vector<Contender>& all) const;
   bool under_two_conditions(const Contender& contender) const;
   double needed_of(const Contender& contender) const;

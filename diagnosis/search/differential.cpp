@@ -12,6 +12,7 @@
 #include "diagnosis/records/series.hpp"
 #include "diagnosis/records/signal_name.hpp"
 #include "diagnosis/records/stretches.hpp"
+#include "diagnosis/replica/model_comparison.hpp"
 #include "diagnosis/search/controller_check.hpp"
 #include "diagnosis/search/controller_lags.hpp"
 #include "diagnosis/search/evidence.hpp"
@@ -30,6 +31,7 @@ constexpr std::size_t kSlack = 3;
 constexpr double kUntold = 20, kFarOff = 5;
 /// Each lap is held against one of the healthy run where that leaves less than this of the scatter.
 constexpr double kClearlyLess = 0.5;
+constexpr double kApart_s = 0.1;  ///< between two parts of a record
 /// Part of the readings that may be left out without a word.
 constexpr double kLeftOut = 0.2;
 
@@ -56,6 +58,28 @@ double median_size(const std::vector<double>& series) {
   return sizes.empty() ? 0 : median(std::move(sizes));
 }
 
+/// The longest three parts of a record that these samples, in order, are: "12.3 .. 14.1 s, 20 s".
+std::string longest_of(const std::vector<std::size_t>& samples, const Record& record) {
+  const auto apart = static_cast<std::size_t>(kApart_s / record.period) + 1;
+  std::vector<std::pair<std::size_t, std::size_t>> parts;
+  for (const std::size_t k : samples)
+    if (parts.empty() || k > parts.back().second + apart)
+      parts.emplace_back(k, k);
+    else
+      parts.back().second = k;
+  std::stable_sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) {
+    return a.second - a.first > b.second - b.first;
+  });
+  if (parts.size() > 3) parts.resize(3);
+  std::sort(parts.begin(), parts.end());
+  std::vector<std::string> times;
+  for (const auto& [from, to] : parts)
+    times.push_back(to - from <= apart ? fmt::format("{:.2f}", record.time_of(from))
+                                       : fmt::format("{:.2f} .. {:.2f}", record.time_of(from),
+                                                     record.time_of(to)));
+  return fmt::format("{} s", fmt::join(times, ", "));
+}
+
 /// The signals that can be compared: "position X, force X".
 std::string measured_by(const Record& record) {
   std::string names;
@@ -77,17 +101,20 @@ std::vector<std::pair<ComparedChannel, double>> leave_out_untold(Record& differe
                                  kFarOff * median_size(wrong));
     if (most <= 0) continue;
     double sum = 0, n = 0, left_out = 0;
+    std::vector<std::size_t> where;
     for (std::size_t k = 0; k < wrong.size(); ++k) {
       const double d = wrong[k];
-      if (std::abs(d) > most) signal.value[k] = kMissing, ++left_out;
+      if (std::abs(d) > most) signal.value[k] = kMissing, ++left_out, where.push_back(k);
       if (std::abs(d) <= most) sum += d * d, n += 1;
     }
     off.emplace_back(ComparedChannel{signal.kind, signal.axis}, n > 0 ? std::sqrt(sum / n) : 0);
+    const ShownUnit shown = shown_unit({signal.kind, signal.axis});
     if (left_out > kLeftOut * (n + left_out))
       difference.warnings.push_back(fmt::format(
-          "{}: {:.0f} % of the readings are left out, since the model is far off the healthy run "
-          "there.",
-          signal_name(signal.kind, signal.axis), 100 * left_out / (n + left_out)));
+          "{}: {:.0f} % of the readings are left out, where the model is off the healthy run by "
+          "more than {:.3g} {}, for the longest at {}.",
+          signal_name(signal.kind, signal.axis), 100 * left_out / (n + left_out),
+          shown.factor * most, shown.name, longest_of(where, difference)));
   }
   return off;
 }

@@ -277,6 +277,15 @@ std::set<std::string> drives_found(const FittedMachine& m,
   return drives;
 }
 
+std::vector<Column> FittedMachine::columns_of(std::size_t which) const {
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < which; ++i) first += added[i].numbers.size();
+  const std::size_t end = std::min(first + added[which].numbers.size(), columns.size());
+  std::vector<Column> all;
+  for (std::size_t c = first; c < end; ++c) all.push_back(columns[c]);
+  return all;
+}
+
 std::vector<FreedNumber> FittedMachine::numbers() const {
   std::vector<FreedNumber> all;
   for (const AddedEffect& a : added) all.insert(all.end(), a.numbers.begin(), a.numbers.end());

@@ -21,6 +21,7 @@ namespace vcnc {
 struct AddedEffect {
   std::size_t candidate = 0;  ///< index into the candidates
   std::vector<FreedNumber> numbers{};
+  std::set<std::string> needless{};  ///< keys of those that may be as declared (needed_numbers.hpp)
   double gain = 0;
   Explained explained{};                  ///< held-out chi-square per channel, back without it
   ActingSlices acts{};                    ///< when it does something
@@ -46,7 +47,8 @@ struct FittedMachine {
   double held_out = std::numeric_limits<double>::infinity();
   std::vector<double> rounding;  ///< held-out chi-square per channel; see doubt_of()
 
-  std::vector<FreedNumber> numbers() const;  ///< of all added effects
+  std::vector<FreedNumber> numbers() const;                 ///< of all added effects
+  std::vector<Column> columns_of(std::size_t added) const;  ///< of the numbers of one of them
   std::size_t found() const { return added.size() + released.size(); }
   std::vector<Explained> explained() const;  ///< by each, and each released number
   std::vector<ActingSlices> acting() const;  ///< each of the same

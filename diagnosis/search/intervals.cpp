@@ -14,8 +14,6 @@ constexpr double kExactForm = 0.01;
 /// What the scatter of few conditions misses of the variance between them.
 constexpr double kFewConditions = 1.3;
 constexpr double kFewLaps = 4;  ///< too few for their scatter to tell anything
-/// Standard deviation of a number, of the size of its effect, by the form of the law.
-constexpr double kKnownTo = 0.02;
 
 /// Two-sided 95 % quantile of Student's t: the expansion about the normal one (Abramowitz & Stegun
 /// 26.7.5), within 1 % from 3 degrees of freedom on.

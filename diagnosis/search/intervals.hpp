@@ -18,6 +18,9 @@
 
 namespace vcnc {
 
+/// Standard deviation of a number, of the size of its effect, by the form of the law.
+inline constexpr double kKnownTo = 0.02;
+
 struct Interval {
   double half_width = 0;  ///< of the 95 % interval, in the unit of the key
   /// The same were the shapes of effects known: the height of a slow drift and its time constant

@@ -626,6 +626,7 @@ class Search {
         effect ? taken_out(m, i, Common::free) : m.holding(number->key, result_.base);
     Contest contest(rules_, less);
     const double lost = contest.held_out() - m.held_out;
+    if (effect) effect->needless = contest.needless_among(effect->numbers, m.columns_of(i), lost);
     std::vector<Contender> rivals =
         contest.rivals(kNearLoss * lost, effect ? effect->candidate : candidates_.size());
     if (number)
@@ -737,7 +738,10 @@ class Search {
       const double less_counts = present - counted_within(instead, contest);
       if (less_counts > band || instead.added.empty() || !holds_up(instead)) continue;
       alike.push_back(r.candidate);
-      const double intricacy = contest.intricacy(instead.added.back()) + less_counts / band;
+      AddedEffect& last = instead.added.back();
+      last.needless =
+          contest.needless_among(last.numbers, instead.columns_of(instead.added.size() - 1), lost);
+      const double intricacy = contest.intricacy(last) + less_counts / band;
       if (intricacy > least - kClearlySimpler) continue;
       least = intricacy;
       simplest = std::move(instead);

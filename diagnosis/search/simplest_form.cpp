@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 
 #include "diagnosis/search/consequence.hpp"
 #include "diagnosis/search/intervals.hpp"
+#include "diagnosis/search/needed_numbers.hpp"
+#include "diagnosis/search/screening.hpp"
 #include "diagnosis/search/trial.hpp"
 
 namespace vcnc {
@@ -38,30 +41,36 @@ void forget(FittedMachine& m, std::size_t effect, std::size_t number) {
     m.columns.erase(m.columns.begin() + static_cast<std::ptrdiff_t>(column));
 }
 
-void put_back_unneeded(const Evidence& evidence, const Machine& declared, double least_cost,
-                       FittedMachine& m) {
+/// What the record can do without, all else fitted again, is as declared.
+void put_back_unneeded(const Evidence& evidence, const Machine& declared,
+                       const DiagnosisOptions& options, double floor, FittedMachine& m) {
+  const double cost = std::max(kUnneeded, kUnneededPart * options.least_gain);
+  const bool inexact = is_inexact(evidence, options, floor, m.held_out);
   for (std::size_t e = 0; e < m.added.size(); ++e) {
-    while (true) {
-      const std::vector<std::size_t> amplitudes = amplitudes_of(m.added[e]);
-      if (amplitudes.size() < 2) break;
-      const double chi2 = evidence.chi2(m.residual, Role::both);
-      double least = least_cost;
-      std::size_t which = m.added[e].numbers.size();
-      Machine without;
-      for (const std::size_t i : amplitudes) {
-        Machine less = m.machine;
-        const std::string& key = m.added[e].numbers[i].number.key;
-        move_number(less, key, number_of(declared, key));
-        const double cost =
-            evidence.chi2(evidence.residual(evidence.predict(less)), Role::both) - chi2;
-        if (cost < least) least = cost, which = i, without = std::move(less);
-      }
-      if (which == m.added[e].numbers.size()) break;
-      forget(m, e, which);
-      m.machine = std::move(without);
-      m.prediction = evidence.predict(m.machine);
-      m.residual = evidence.residual(m.prediction);
+    if (amplitudes_of(m.added[e]).size() < 2) continue;
+    LinearPart all = m.linear();
+    const Ground ground(evidence, m.residual, all);
+    const auto n = static_cast<Eigen::Index>(all.numbers.size());
+    for (Eigen::Index i = 0; i < n; ++i) {  // where the least is, which a fit may stop short of
+      FreedNumber& number = all.numbers[static_cast<std::size_t>(i)];
+      number.value += ground.step[i] * number.number.typical;
     }
+    Eigen::MatrixXd information =
+        ground.grams.fitted.block(1, 1, n, n) + ground.grams.held_out.block(1, 1, n, n);
+    information.diagonal() += ground.precision;
+    const double known_to = inexact ? kKnownTo * kKnownTo * m.added[e].gain : 0;
+    const std::set<std::string> keys = needless_of(m.added[e].numbers, all.numbers, information,
+                                                   declared, std::max(cost, known_to));
+    if (keys.empty()) continue;
+    FittedMachine less = m;
+    for (std::size_t i = m.added[e].numbers.size(); i-- > 0;) {
+      const std::string& key = m.added[e].numbers[i].number.key;
+      if (!keys.contains(key)) continue;
+      forget(less, e, i);
+      move_number(less.machine, key, number_of(declared, key));
+    }
+    converge(evidence, less);
+    if (less.held_out <= m.held_out + options.least_gain) m = std::move(less);
   }
 }
 
@@ -151,8 +160,7 @@ void prefer_positive(const Evidence& evidence, FittedMachine& m) {
 
 void bring_to_simplest_form(const Evidence& evidence, const Machine& declared,
                             const DiagnosisOptions& options, double floor, FittedMachine& machine) {
-  put_back_unneeded(evidence, declared, std::max(kUnneeded, kUnneededPart * options.least_gain),
-                    machine);
+  put_back_unneeded(evidence, declared, options, floor, machine);
   put_back_undetermined(evidence, declared, options, floor, machine);
   put_back_idle(evidence, declared, machine);
   prefer_positive(evidence, machine);

@@ -47,7 +47,7 @@ std::string arc(double from, double start_deg, double sweep_deg) {
 
 /// Some laps each way, with noise for a length.
 MeasuredTable table(int laps) {
-  MeasuredTable t{.source = "bar.csv", .columns = {}, .line = {}, .notes = {}};
+  MeasuredTable t{.source = "bar.csv", .columns = {}, .line = {}};
   t.columns.resize(2);
   t.columns[0].name = "t";
   t.columns[1].name = "r";

@@ -52,7 +52,7 @@ const Columns& columns() {
 }
 
 MeasuredTable table_of(const Columns& all, std::size_t rows = kRows) {
-  MeasuredTable table{.source = "run.csv", .columns = {}, .line = {}, .notes = {}};
+  MeasuredTable table{.source = "run.csv", .columns = {}, .line = {}};
   std::mt19937 random(7);
   for (const auto& [name, f] : all) {
     MeasuredColumn& c = table.columns.emplace_back();
@@ -477,6 +477,33 @@ TEST(ImportTable, WarnsOfWhatIsOnlySuspicious) {
 }
 
 /// A transmission that gives way leaves the load behind.
+TEST(ImportTable, AUnitThatTheTableCallsOtherwiseIsTold) {
+  const auto told = [](const std::string& unit, const std::string& more = "") {
+    MeasuredTable table = table_of(columns());
+    for (MeasuredColumn& c : table.columns)
+      if (c.name == "force") c.unit = unit;
+    return imported(kTime + signal("cmd", "command", "X", "m") +
+                        signal("pos", "position", "X", "m") +
+                        signal("force", "force", "X", "N", more),
+                    table);
+  };
+  EXPECT_TRUE(warned(told("kN"), "column \"force\" is in kN by the table and in N by the map"));
+  EXPECT_TRUE(warned(told("[Nm]"), "in Nm by the table"));
+  EXPECT_EQ(told("Nm", "scale = 1.001").warnings.size(), 0U);  // which may convert it
+  for (const char* unit : {"N", "(N)", "counts", ""})
+    EXPECT_EQ(told(unit).warnings.size(), 0U) << unit;
+  for (const char* micrometres : {"um", "\u00b5m", "[\u03bcm]", "\xb5m"}) {
+    MeasuredTable table = table_of(columns());
+    for (MeasuredColumn& c : table.columns)
+      if (c.name == "pos") c.name = std::string("pos (") + micrometres + ")";
+    const std::string map = kTime + signal("cmd", "command", "X", "m");
+    EXPECT_TRUE(warned(
+        imported(map + signal(std::string("pos (") + micrometres + ")", "position", "X", "m"),
+                 table),
+        "is in um by the table and in m by the map"));
+  }
+}
+
 TEST(ImportTable, MotorAndLoadThatAreSwappedAreSuspicious) {
   Columns all = columns();
   all["motor"] = [](double t) { return LinearAxis::position(t) + LinearAxis::force(t) / 2e7; };
@@ -638,7 +665,7 @@ TEST(ImportTable, AForceThatIsRecordedLateIsSuspicious) {
 /// A ball in a ring: x and y go round, z stays.
 MeasuredTable table_of_readings(double noise, const std::function<bool(double)>& touches) {
   std::mt19937 random(3);
-  MeasuredTable table{.source = "run.csv", .columns = {}, .line = {}, .notes = {}};
+  MeasuredTable table{.source = "run.csv", .columns = {}, .line = {}};
   const std::vector<std::string> names{"cx", "cy", "cz", "dx", "dy", "dz"};
   for (const std::string& name : names) {
     MeasuredColumn& c = table.columns.emplace_back();

@@ -131,7 +131,7 @@ TEST(MeasuredTable, RefusesWithLineAndReason) {
 }
 
 MeasuredTable numbered(std::size_t rows) {
-  MeasuredTable table{.source = "run.csv", .columns = {}, .line = {}, .notes = {}};
+  MeasuredTable table{.source = "run.csv", .columns = {}, .line = {}};
   for (std::size_t i = 0; i < rows; ++i) table.line.push_back(i + 2);
   return table;
 }

@@ -555,6 +555,88 @@ TEST(Selection, TwoOfOneDriveThatTakeEachOtherBackAreNotTold) {
   }
 }
 
+/// What it measures lies somewhere.
+class LyingWaves : public WaveReplica {
+ public:
+  using WaveReplica::WaveReplica;
+
+  Prediction predict(const Machine& m) const override {
+    const Prediction waves = WaveReplica::predict(m);
+    std::vector<double> x = waves[0];
+    for (double& value : x)
+      value += m.effects.get<PieceOffset>().shift.x() + 0.3 * m.effects.get<Squareness>().xz;
+    return {x};
+  }
+};
+
+TEST(Selection, OfEqualsTakesTheOneThatNeedsFewerNumbers) {
+  // Squareness has a number for an axis that stands: with it the piece lies elsewhere, as it may
+  // anyway. The other one needs both of its numbers to do the same.
+  const std::string xy = "effects.geometry.squareness.xy_urad",
+                    xz = "effects.geometry.squareness.xz_urad",
+                    one = "effects.X.straightness.first_bow_um",
+                    two = "effects.X.straightness.second_bow_um",
+                    shift = "effects.setup.piece_offset.shift_um.x";
+  Record record = toy::commands(1000, 4);
+  LyingWaves replica(record.samples(),
+                     {{xy.c_str(), {1, 0}}, {one.c_str(), {0.7, 0.7}}, {two.c_str(), {0, 0.7}}});
+  read(record, replica, toy::machine({{xy, 2}, {shift, 300}}), 24);
+  const std::vector<Candidate> all{
+      {"other", "", {{one, 1, -1000, 1000}, {two, 1, -1000, 1000}}, {}},
+      {"squareness", "", {{xy, 1, -1000, 1000}, {xz, 1, -1000, 1000}}, {}}};
+  Evidence evidence(record, replica, {});
+  const SelectionResult result = select_effects_of(evidence, {}, all, {}, {});
+  EXPECT_EQ(names(result, all), "squareness");
+  EXPECT_NEAR(number_of(result.found.machine, xy), 2, 0.02);
+}
+
+/// Play that does nothing below 2 um, where nothing rubs.
+class PlayBesideFriction : public WaveReplica {
+ public:
+  using WaveReplica::WaveReplica;
+  static constexpr const char *kPlay = "effects.X.backlash.gap_um",
+                              *kFriction = "effects.X.load_play.width_um";
+
+  Prediction predict(const Machine& m) const override {
+    const Prediction waves = WaveReplica::predict(m);
+    const double play = number_of(m, kPlay);
+    std::vector<double> x = waves[0];
+    if (play > 2 || number_of(m, kFriction) > 0.1)
+      for (std::size_t k = 0; k < x.size(); ++k) {
+        const double lap = 2 * kPi * static_cast<double>(k) / 1000;
+        x[k] += 1e-6 * play * (std::sin(3 * lap) + std::sin(4 * lap));
+      }
+    return {x};
+  }
+};
+
+TEST(Selection, TwoOfOnePlaceThatAnotherDoesAsWellAsAreThatOne) {
+  // Its sensitivity tells nothing of play, so two others of its place are found first, one of which
+  // takes along what no model knows.
+  const char* other = "effects.X.lost_motion.compliance_nm_per_N";
+  Record record = toy::commands(1000, 4);
+  PlayBesideFriction replica(record.samples(), {{PlayBesideFriction::kFriction, {1, 0, 0.05}},
+                                                {other, {0, 1}},
+                                                {PlayBesideFriction::kPlay, {}}});
+  read(record, replica, toy::machine({{PlayBesideFriction::kPlay, 3}}), 25);
+  std::vector<double>& reading = record.signals.back().value;
+  for (std::size_t k = 0; k < reading.size(); ++k)
+    reading[k] += 0.15e-6 * std::sin(2 * kPi * 5 * static_cast<double>(k) / 1000);
+  std::vector<Candidate> all = replica.candidates();
+  const std::string x = "X", y = "Y";
+  for (const std::string& place : {x, y}) {
+    for (Candidate& c : all) c.family = Family::mechanics, c.place = x;
+    all[1].place = place;
+    Evidence evidence(record, replica, {});
+    DiagnosisOptions options;
+    options.share_of_found = 0.005;
+    const SelectionResult result = select_effects_of(evidence, {}, all, options, {});
+    EXPECT_EQ(result.found.added.size(), place == x ? 1U : 2U) << names(result, all);
+    if (place != x) continue;
+    EXPECT_NEAR(number_of(result.found.machine, PlayBesideFriction::kPlay), 3, 0.02);
+  }
+}
+
 TEST(Selection, ManyThatDoALittleEachAreNotTold) {
   const std::vector<const char*> keys{"effects.X.load_play.width_um",
                                       "effects.Y.load_play.width_um",

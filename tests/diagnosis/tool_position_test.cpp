@@ -227,7 +227,7 @@ zero_mm = [20, -10, 100]
 )";
 
 MeasuredTable table() {
-  MeasuredTable t{.source = "grid.csv", .columns = {}, .line = {}, .notes = {}};
+  MeasuredTable t{.source = "grid.csv", .columns = {}, .line = {}};
   t.columns.resize(4);
   t.columns[0].name = "t";
   t.columns[1].name = "X";
