@@ -59,6 +59,7 @@ struct ContestRules {
   std::vector<double> floor_of;  ///< of it per channel
   /// Told what is done and how far it is; false stops the work.
   std::function<bool(const std::string&, double)> go;
+  std::function<bool()> goes_on;  ///< whether it did not
 
   double excess(double held_out) const;
   /// What a candidate must gain where so much is left.

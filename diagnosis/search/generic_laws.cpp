@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/law_columns.hpp"
 #include "diagnosis/search/law_fit.hpp"
 #include "diagnosis/search/law_in_loop.hpp"
@@ -32,7 +33,6 @@ constexpr double kMoreByKnots = 3, kMoreInTheLoop = 1.5, kComparable = 0.5;
 constexpr double kWrongAboutOne = 0.05;
 /// Part of what the least of many names does that a law need not do.
 constexpr double kOfTheLeast = 0.1;
-constexpr double kNormal95 = 1.96;
 constexpr double kOneWay = 0.9;         ///< what a gain weighs of a law that acts one way only
 constexpr double kContradicted = 0.05;  ///< of a gain, that a law may lose elsewhere
 constexpr std::size_t kMostAlike = 5;   ///< that are named

@@ -8,7 +8,6 @@
 namespace vcnc {
 namespace {
 
-constexpr double kNormal95 = 1.96;
 /// Of the noise's chi-square: a form that leaves less in every channel makes no model inexact.
 constexpr double kExactForm = 0.01;
 /// What the scatter of few conditions misses of the variance between them.

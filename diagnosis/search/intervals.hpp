@@ -18,6 +18,8 @@
 
 namespace vcnc {
 
+/// Half width of the interval that holds 95 % of a normal distribution, in standard deviations.
+inline constexpr double kNormal95 = 1.96;
 /// Standard deviation of a number, of the size of its effect, by the form of the law.
 inline constexpr double kKnownTo = 0.02;
 

@@ -6,9 +6,10 @@
 //     refit                  the best few nonlinearly (refit.hpp); pairs where no one explains half
 //                            or the best one has many numbers
 //     accept                 the one with the largest gain on held-out laps, if it is enough
-//     converge, drop test    all together; what is no longer needed goes
-//     exchange               each one taken out, all candidates and declared numbers compete
-//     join                   two of one place taken out, and one that does as much found
+//     converge, drop test    all together; what is no longer needed goes (machine_changes.hpp)
+//     try again              with what was found, and with shapes that show now (trial_pool.hpp)
+//     exchange               each one taken out, all candidates and declared numbers compete; two
+//                            of one place, and one that does as much (exchange.hpp)
 //   begin otherwise          where much is left: with another of the first contenders
 //
 // Where names leave more than a tenth, a law without a name (generic_laws.hpp) is fitted alone. The
@@ -43,10 +44,6 @@
 #include "diagnosis/search/screening.hpp"
 
 namespace vcnc {
-
-/// Whether two effects that make `one` and `other` of chi-square, and `both` together, take each
-/// other back: what they explain is what they differ by, and the rest is anybody's.
-bool take_each_other_back(double one, double other, double both);
 
 struct DiagnosisProgress {
   std::string doing;  ///< "screening 212 candidates"

@@ -555,7 +555,7 @@ TEST(Diagnose, NamesProgramsThatThereAre) {
   // Effects that the toy does not show, one for every way of showing one.
   for (const char* name : {"backlash", "cable_chain", "encoder_eccentricity", "structural_mode",
                            "thermal_drift", "friction_fade", "sample_latency"})
-    all.push_back({name, "Z", {{"effects.Z.backlash.gap_um", 5, 0, 1000, true}}, {}});
+    all.push_back({name, "Y", {{"effects.Y.backlash.gap_um", 5, 0, 1000, true}}, {}});
   const Record record = measured(truth, 34);
   toy::ToyReplica replica(record);
   const Diagnosis d = diagnose({record, replica, truth, all});
@@ -566,6 +566,25 @@ TEST(Diagnose, NamesProgramsThatThereAre) {
     EXPECT_TRUE(known.contains(e.program)) << e.name << ": " << e.program;
   }
   EXPECT_GE(named, 7U);
+}
+
+TEST(Diagnose, ListsNothingOfAxesThatTheRunHasNoSignalOf) {
+  Machine truth;
+  std::vector<Candidate> all = toy::candidates();
+  all.push_back({"backlash", "Y", {{"effects.Y.backlash.gap_um", 5, 0, 1000, true}}, {}});
+  all.push_back({"backlash", "Z", {{"effects.Z.backlash.gap_um", 5, 0, 1000, true}}, {}});
+  const Record record = measured(truth, 34);
+  toy::ToyReplica replica(record);
+  const Diagnosis d = diagnose({record, replica, truth, all});
+  const auto listed = [&](const std::string& name) {
+    return std::any_of(d.excitation.begin(), d.excitation.end(),
+                       [&](const Excitation& e) { return e.name == name; });
+  };
+  EXPECT_TRUE(listed("Y.backlash"));
+  EXPECT_FALSE(listed("Z.backlash"));
+  EXPECT_TRUE(std::any_of(d.notes.begin(), d.notes.end(), [](const std::string& note) {
+    return note.starts_with("The run holds no signal of Z, taken to stand");
+  }));
 }
 
 TEST(Diagnose, ReferenceRunCancelsWhatTheModelGetsWrong) {

@@ -8,6 +8,7 @@
 #include "diagnosis/search/contest.hpp"
 #include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/least_squares.hpp"
+#include "diagnosis/search/machine_changes.hpp"
 #include "diagnosis/search/noise_audit.hpp"
 #include "diagnosis/search/packed_column.hpp"
 #include "diagnosis/search/selection.hpp"
@@ -568,7 +569,7 @@ struct QuietContest {
     return record;
   }
   ContestRules rules(double floor, std::vector<double> floor_of) {
-    return {evidence, none, options, trials, {}, floor, std::move(floor_of), {}};
+    return {evidence, none, options, trials, {}, floor, std::move(floor_of), {}, {}};
   }
 };
 
