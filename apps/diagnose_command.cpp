@@ -77,16 +77,22 @@ std::string other_machine(const Record& run, const Record& other) {
       keys.size() > 1 ? fmt::format("; {} more keys differ", keys.size() - 1) : "");
 }
 
-void tell_unknown_forces(const ForceOfAxes& unknown, std::vector<std::string>& notes) {
-  std::string forces;
+/// With how the declared machine is fitted to the reference run.
+void tell_unknown_forces(const DiagnoseOptions& options, const ForceOfAxes& unknown,
+                         std::vector<std::string>& notes) {
+  std::vector<std::string> forces;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     if (const double square = mean_square(unknown[axis]); square > 0)
-      forces += fmt::format("{}{:.3g} {} rms on {}", forces.empty() ? "" : ", ", std::sqrt(square),
-                            is_rotary(axis) ? "N m" : "N", kAxisNames[axis]);
-  if (!forces.empty())
-    notes.push_back("The reference run has forces that the declared machine has not, " + forces +
-                    "; they count as there in this run, too. vcnc commission fits friction laws to "
-                    "such a run; against that model changes of friction are told better.");
+      forces.push_back(fmt::format("{:.3g} {} rms on {}", std::sqrt(square),
+                                   is_rotary(axis) ? "N m" : "N", kAxisNames[axis]));
+  if (forces.empty()) return;
+  notes.push_back(fmt::format(
+      "The reference run has forces that the declared machine has not, {}; they count as there in "
+      "this run, too. Names and sizes are surer against a model that is fitted to it: `vcnc "
+      "commission {}{}{} --out fitted.toml`, then --model fitted.toml.",
+      fmt::join(forces, ", "), options.reference,
+      options.map.empty() ? "" : " --map " + options.map,
+      options.model.empty() ? "" : " --model " + options.model));
 }
 
 void tell_lags(const Machine& declared, const Machine& healthy, std::vector<std::string>& notes) {
@@ -242,7 +248,7 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
     replica.apply(difference.unknown);
     d = diagnose(of, difference, asked, keep_going);
     tell_lags(declared, healthy->machine, d.notes);
-    tell_unknown_forces(healthy->unknown, d.notes);
+    tell_unknown_forces(options, healthy->unknown, d.notes);
   } else {
     d = diagnose(of, asked, keep_going);
   }

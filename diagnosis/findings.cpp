@@ -99,13 +99,13 @@ class Report {
     add(d_.notes, notes_of_lines(evidence_, before_.chatter, d_.effects));
     add(d_.notes, notes_of_events(evidence_));
     add(d_.notes, notes_of_turning(evidence_));
-    std::vector<std::string> off = what_is_still_off();
+    std::vector<StillOff> off = what_is_still_off();
     still_off_ = !off.empty();
     if (!selection_.interrupted) tell_laws();
     if (!d_.laws.empty()) off = what_is_still_off();
     // Without a law, numbers were pulled for want of it.
     if (d_.laws.empty()) add(d_.notes, pulled_);
-    add(d_.notes, off);
+    tell_still_off(off);
     tell_chatter();
     tell_shifts_between_laps();
     std::stable_sort(d_.effects.begin(), d_.effects.end(), [](const auto& a, const auto& b) {
@@ -528,12 +528,18 @@ class Report {
     });
   }
 
+  /// RMS on held-out laps [SI].
+  struct StillOff {
+    ComparedChannel channel;
+    double is, noise, was;
+  };
+
   /// Signals that are still off by more than noise, and by more of what they were off than a
   /// model of something that was found may be wrong by, on fitted and on held-out laps: what one
   /// lap does alone is no deviation. Of what an axis that vibrates by itself moves tell_chatter()
   /// tells.
-  std::vector<std::string> what_is_still_off() const {
-    std::vector<std::string> off;
+  std::vector<StillOff> what_is_still_off() const {
+    std::vector<StillOff> off;
     const Prediction found = evidence_.predict(d_.found);
     // Where the piece lies is no fault that a model of it could be wrong about.
     Machine clamped = of_.declared;
@@ -555,14 +561,21 @@ class Report {
       };
       const double loud = std::max(kLoud * noise, 0.5 * evidence_.step_of(c));
       if (std::min(is, fitted[c]) < loud || beyond(is) < kWrongOfFound * beyond(was)) continue;
-      const ComparedChannel& channel = evidence_.replica().channels()[c];
+      off.push_back({evidence_.replica().channels()[c], is, noise, was});
+    }
+    return off;
+  }
+
+  void tell_still_off(const std::vector<StillOff>& off) {
+    double most = 0;
+    for (const auto& [channel, is, noise, was] : off) {
       const ShownUnit unit = shown_unit(channel);
-      off.push_back(fmt::format(
+      d_.notes.push_back(fmt::format(
           "{} is still off by {:.3g} {} rms on held-out laps, {:.3g} times "
           "its noise; it was {:.3g}.",
           channel_name(channel), is * unit.factor, unit.name, is / noise, was * unit.factor));
+      if (is / noise > most) most = is / noise, d_.still_off = channel;
     }
-    return off;
   }
 
   void tell_laws() {

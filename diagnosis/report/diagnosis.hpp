@@ -94,6 +94,7 @@ struct Diagnosis {
   /// cause.
   std::vector<std::string> vibrations;
   std::vector<SignalFigure> figures;
+  std::optional<ComparedChannel> still_off;  ///< the signal that is furthest off in the end
   std::vector<Excitation> excitation;
   std::vector<Rung> ladder;
   std::vector<std::string> warnings, notes;

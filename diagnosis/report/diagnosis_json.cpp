@@ -18,9 +18,12 @@ Json number(const FittedNumber& n) {
   return {{"key", n.key}, {"value", n.value}, {"low", finite(n.low)}, {"high", finite(n.high)}};
 }
 
-Json effect(const FoundEffect& e) {
+Json effect(const FoundEffect& e, const Machine& declared) {
   Json numbers = Json::array();
-  for (const FittedNumber& n : e.numbers) numbers.push_back(number(n));
+  for (const FittedNumber& n : e.numbers) {
+    numbers.push_back(number(n));
+    numbers.back()["declared"] = number_of(declared, n.key);
+  }
   return {{"name", e.name},
           {"axis", e.place},
           {"parameters", numbers},
@@ -79,25 +82,26 @@ Json list(const std::vector<T>& all, const F& one) {
 }  // namespace
 
 std::string to_json(const Diagnosis& d, const std::string& source) {
-  const Json json{{"run", source},
-                  {"verdict", to_string(d.verdict)},
-                  {"mode", d.differential ? "differential" : "absolute"},
-                  {"explained_share", finite(d.explained_share)},
-                  {"model_form_share", finite(d.model_form_share)},
-                  {"suspects", d.suspects},
-                  {"chi2_held_out",
-                   {{"before", finite(d.chi2.before)},
-                    {"after", finite(d.chi2.after)},
-                    {"noise", finite(d.chi2.noise)}}},
-                  {"effects", list(d.effects, effect)},
-                  {"uncertain", list(d.uncertain, number)},
-                  {"laws", list(d.laws, learned_law)},
-                  {"vibrations", d.vibrations},
-                  {"figures", list(d.figures, figure_json)},
-                  {"ladder", list(d.ladder, rung)},
-                  {"excitation", list(d.excitation, excitation)},
-                  {"warnings", d.warnings},
-                  {"notes", d.notes}};
+  const Json json{
+      {"run", source},
+      {"verdict", to_string(d.verdict)},
+      {"mode", d.differential ? "differential" : "absolute"},
+      {"explained_share", finite(d.explained_share)},
+      {"model_form_share", finite(d.model_form_share)},
+      {"suspects", d.suspects},
+      {"chi2_held_out",
+       {{"before", finite(d.chi2.before)},
+        {"after", finite(d.chi2.after)},
+        {"noise", finite(d.chi2.noise)}}},
+      {"effects", list(d.effects, [&](const FoundEffect& e) { return effect(e, d.declared); })},
+      {"uncertain", list(d.uncertain, number)},
+      {"laws", list(d.laws, learned_law)},
+      {"vibrations", d.vibrations},
+      {"figures", list(d.figures, figure_json)},
+      {"ladder", list(d.ladder, rung)},
+      {"excitation", list(d.excitation, excitation)},
+      {"warnings", d.warnings},
+      {"notes", d.notes}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "analysis/html.hpp"
 #include "diagnosis/report/diagnosis_figures.hpp"
@@ -22,7 +21,6 @@ using namespace html;
 
 constexpr std::size_t kShownChannels = 6, kShownCovariates = 3;
 constexpr double kWorthShowing = 0.02;  ///< of the residual's variance
-constexpr double kStillOff = 1.5;       ///< times its noise
 
 constexpr const char* kDiagnosisStyle = R"(
 .verdict.good { --c: var(--pass); } .verdict.bad { --c: var(--fail); } .verdict.open { --c: var(--open); }
@@ -74,10 +72,10 @@ std::string effect_box(const FoundEffect& e, const Diagnosis& d) {
       : e.acquisition ? ", of the measurement"
                       : "");
   for (const FittedNumber& n : e.numbers)
-    text += fmt::format("<tr><td><code>{}</code></td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-                        escaped(n.key),
-                        with_interval(n) + (deviation ? "; " + against_declared(n, d) : ""),
-                        escaped(unit_of_key(n.key)), interval_bar(n));
+    text += fmt::format(
+        "<tr><td><code>{}</code></td><td>{}</td><td>{}</td><td>{}</td></tr>\n", escaped(n.key),
+        deviation ? with_interval(n) + ", " + against_declared(n, d) : with_change(n, d),
+        escaped(unit_of_key(n.key)), interval_bar(n));
   text += "</table><p>";
   if (std::isfinite(e.gain))
     text += fmt::format("Chi-square gained on what was held out: {:.3g}. ", e.gain);
@@ -190,20 +188,6 @@ std::string correlation_section(const DiagnosisStory& story, std::size_t c, Off 
   return text;
 }
 
-/// The channel that is most off in the end, of what noise makes of it on held-out laps.
-std::optional<std::size_t> still_off(const DiagnosisStory& story) {
-  std::optional<std::size_t> worst;
-  double most = kStillOff;
-  for (const SignalFigure& f : story.diagnosis.figures) {
-    const auto& channels = story.residuals.channels;
-    const auto at = std::find(channels.begin(), channels.end(), f.channel);
-    if (f.run != "held-out laps" || at == channels.end() || !(f.after > most * f.floor)) continue;
-    most = f.after / f.floor;
-    worst = static_cast<std::size_t>(at - channels.begin());
-  }
-  return worst;
-}
-
 std::string size_cell(const Excitation& e, double limit) {
   return e.excited && std::isfinite(limit) ? fmt::format("{:.3g} {}", limit, unit_of_key(e.key))
                                            : std::string("not excited");
@@ -289,8 +273,13 @@ std::string diagnosis_page(const DiagnosisStory& story) {
   if (!d.figures.empty()) page += "<h2>Before and after</h2>\n" + figures_section(d.figures);
   if (!shown.empty()) {
     page += correlation_section(story, shown.front(), Off::before);
-    if (const auto left = still_off(story); left && *left != shown.front())
-      page += correlation_section(story, *left, Off::after);
+    const std::vector<ComparedChannel>& channels = story.residuals.channels;
+    if (d.still_off && *d.still_off != channels[shown.front()])
+      page += correlation_section(
+          story,
+          static_cast<std::size_t>(std::find(channels.begin(), channels.end(), *d.still_off) -
+                                   channels.begin()),
+          Off::after);
   }
   if (d.ladder.size() > 1)
     page += "<h2>One effect after the other</h2>\n" +

@@ -46,6 +46,11 @@ std::string against_declared(const FittedNumber& n, const Diagnosis& d) {
                      d.differential ? "the reference run" : "what is declared");
 }
 
+std::string with_change(const FittedNumber& n, const Diagnosis& d) {
+  const bool declared = number_of(d.declared, n.key) != number_of(Machine(), n.key);
+  return with_interval(n) + (declared ? ", " + against_declared(n, d) : "");
+}
+
 std::string percent(double share) {
   return share < 0.01 ? fmt::format("{:.1g} %", share * 100) : fmt::format("{:.0f} %", share * 100);
 }
@@ -117,7 +122,7 @@ std::string to_text(const Diagnosis& d) {
       numbers +=
           e.name == "deviation"
               ? separator + with_interval(n) + ", " + against_declared(n, d)
-              : fmt::format("{}{} = {}", separator, short_key(n.key, e.name), with_interval(n));
+              : fmt::format("{}{} = {}", separator, short_key(n.key, e.name), with_change(n, d));
     }
     text += fmt::format("  {}{}: {}; contour error {:+.3g} um rms\n", name_of(e),
                         e.minor         ? " (minor)"

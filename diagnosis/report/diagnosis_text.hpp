@@ -20,6 +20,8 @@ std::string verdict_sentence(const Diagnosis& diagnosis);
 std::string with_interval(const FittedNumber& number);
 /// A declared number that is out of tolerance: by how much.
 std::string against_declared(const FittedNumber& number, const Diagnosis& diagnosis);
+/// With its interval and, of an effect that the declared machine has already, with the change.
+std::string with_change(const FittedNumber& number, const Diagnosis& diagnosis);
 
 /// A share in percent: whole ones, below 1 the first digit that is not nought.
 std::string percent(double share);

@@ -24,6 +24,8 @@ constexpr CommonTolerance kCommonTolerances[] = {
     {"axes.", ".current_lag_us", 0.3, 0},
     {"axes.", ".position_lag_us", 0, 500},
     {"axes.", ".velocity_lag_us", 0, 500},
+    {"effects.", ".windup.compliance_nm_per_N", 0.1, 0},
+    {"effects.", ".windup.compliance_urad_per_Nm", 0.1, 0},
     {"effects.", ".presliding.stiffness_N_per_um", 0.5, 0},
     {"effects.", ".presliding.stiffness_Nm_per_rad", 0.5, 0},
 };

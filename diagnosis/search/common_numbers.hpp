@@ -18,6 +18,7 @@
 //   lag of the position loop                   0.5 ms, half a cycle of 1 ms
 //   lag of the measured velocity               0.5 ms
 //   stiffness of pre-sliding                   50 %: other laws than one bristle turn over slower
+//   compliance of a transmission               10 %, as a builder reckons it
 #pragma once
 
 #include <cstddef>

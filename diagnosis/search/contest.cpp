@@ -14,6 +14,7 @@
 #include "diagnosis/search/needed_numbers.hpp"
 #include "diagnosis/search/parallel.hpp"
 #include "diagnosis/search/suspects.hpp"
+#include "model/effects/list.hpp"
 
 namespace vcnc {
 namespace {
@@ -27,6 +28,7 @@ constexpr double kChance = 3;          ///< standard deviations of a sum of squa
 constexpr double kOfTolerances = 0.3;  ///< numbers, for a decade of tolerances more
 constexpr double kMoreUsual = 0.2;     ///< numbers: a declared one by 50 tolerances
 constexpr double kNothing = 0.03;      ///< of a typical size
+constexpr double kByAnArm = 0.1;  ///< numbers: of equals, what displaces is told, not what turns
 /// Chi-square, or part of what gains are alike by, for which a number may be as declared.
 constexpr double kNeedless = 12, kNeedlessPart = 0.1;
 constexpr double kPromise = 0.3;    ///< of what is needed: worth a refit
@@ -354,7 +356,8 @@ double Contest::intricacy(const Contender& c) const {
         odd_shape = std::max(odd_shape, unusual(size, kUsualShape));
       }
     }
-  return static_cast<double>(numbers) +
+  const bool by_an_arm = rules_.candidates[c.candidate].effect == AngularErrors::text.name;
+  return static_cast<double>(numbers) + (by_an_arm ? kByAnArm : 0) +
          2 * ((largest > 0 ? unusual(largest, kUsual) : 0) + odd_shape);
 }
 

@@ -65,6 +65,7 @@ TEST(CommonNumbers, AreWhatHasATolerance) {
   m.axes[kX].servo.current_lag = 0;
   m.axes[kY].servo.current_lag = 200e-6;
   m.effects.axis[kY].get<Presliding>().stiffness = 30e6;
+  m.effects.axis[kZ].get<Windup>().compliance = 8e-9;
   const std::vector<FreedNumber> all = common_numbers(m);
   const auto of = [&](const std::string& key) {
     for (const FreedNumber& n : all)
@@ -77,6 +78,7 @@ TEST(CommonNumbers, AreWhatHasATolerance) {
   EXPECT_EQ(of("axes.X.position_lag_us"), 500);
   EXPECT_EQ(of("axes.X.velocity_lag_us"), 500);
   EXPECT_DOUBLE_EQ(of("effects.Y.presliding.stiffness_N_per_um"), 15);
+  EXPECT_DOUBLE_EQ(of("effects.Z.windup.compliance_nm_per_N"), 0.8);
   EXPECT_EQ(of("effects.X.presliding.stiffness_N_per_um"), 0);
   for (const FreedNumber& n : all) EXPECT_TRUE(n.common());
 }

@@ -93,6 +93,20 @@ TEST(DiagnosisText, BeginsWithTheVerdictAndHasNumbersWithIntervals) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
 }
 
+TEST(DiagnosisText, OfAnEffectThatIsDeclaredTheChangeIsToldToo) {
+  Diagnosis d = found_backlash();
+  move_number(d.declared, "effects.X.backlash.gap_um", 2);
+  EXPECT_NE(to_text(d).find("gap_um = 5.03 [4.91 .. 5.15], 3.03 [2.91 .. 3.15] against the "
+                            "reference run"),
+            std::string::npos)
+      << to_text(d);
+  EXPECT_NE(diagnosis_page({.diagnosis = d, .record = {}, .residuals = {}})
+                .find("3.03 [2.91 .. 3.15] against"),
+            std::string::npos);
+  const auto json = nlohmann::json::parse(to_json(d, "run.csv"));
+  EXPECT_NEAR(json["effects"][0]["parameters"][0]["declared"].get<double>(), 2, 1e-12);
+}
+
 TEST(LawFigure, DrawsTheCurveWithItsBandInTheUnitsOfPages) {
   LearnedLaw learned;
   learned.law.point = Law::Point::displacement;
