@@ -77,9 +77,9 @@ std::string other_machine(const Record& run, const Record& other) {
       keys.size() > 1 ? fmt::format("; {} more keys differ", keys.size() - 1) : "");
 }
 
-/// With how the declared machine is fitted to the reference run.
+/// With how the declared machine is fitted to the reference run, unless it was.
 void tell_unknown_forces(const DiagnoseOptions& options, const ForceOfAxes& unknown,
-                         std::vector<std::string>& notes) {
+                         bool commissioned, std::vector<std::string>& notes) {
   std::vector<std::string> forces;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     if (const double square = mean_square(unknown[axis]); square > 0)
@@ -88,11 +88,14 @@ void tell_unknown_forces(const DiagnoseOptions& options, const ForceOfAxes& unkn
   if (forces.empty()) return;
   notes.push_back(fmt::format(
       "The reference run has forces that the declared machine has not, {}; they count as there in "
-      "this run, too. Names and sizes are surer against a model that is fitted to it: `vcnc "
-      "commission {}{}{} --out fitted.toml`, then --model fitted.toml.",
-      fmt::join(forces, ", "), options.reference,
-      options.map.empty() ? "" : " --map " + options.map,
-      options.model.empty() ? "" : " --model " + options.model));
+      "this run, too.{}",
+      fmt::join(forces, ", "),
+      commissioned
+          ? ""
+          : fmt::format(" Names and sizes are surer against a model that is fitted to it: `vcnc "
+                        "commission {}{}{} --out fitted.toml`, then --model fitted.toml.",
+                        options.reference, options.map.empty() ? "" : " --map " + options.map,
+                        options.model.empty() ? "" : " --model " + options.model)));
 }
 
 void tell_lags(const Machine& declared, const Machine& healthy, std::vector<std::string>& notes) {
@@ -165,7 +168,7 @@ std::optional<HealthyRun> healthy_run_of(std::optional<CheckedRun> reference,
 }
 
 int compare_models(const DiagnoseOptions& options, const Record& record, const Machine& declared) {
-  const Machine found = load_machine(options.compare);
+  Machine found = load_machine(options.compare);
   std::vector<std::string> warnings;
   checked_replica(record, declared, warnings);
   std::optional<CheckedRun> reference = checked_reference(options, record, declared, warnings);
@@ -174,6 +177,8 @@ int compare_models(const DiagnoseOptions& options, const Record& record, const M
   std::vector<SignalFigure> figures;
   const std::optional<HealthyRun> healthy = healthy_run_of(std::move(reference), declared);
   const Machine& before = healthy ? healthy->machine : declared;
+  // What holds for the healthy run holds in a file that says nothing else.
+  if (healthy) found = with_fitted(std::move(found), declared, before);
   append_figures(figures, record, healthy ? &*healthy : nullptr, before, found, "run");
   predict_tests(options, healthy, before, found, figures);
   std::cout << figures_table(figures);
@@ -248,7 +253,7 @@ Diagnosis diagnose_machine(const DiagnoseOptions& options, const Record& record,
     replica.apply(difference.unknown);
     d = diagnose(of, difference, asked, keep_going);
     tell_lags(declared, healthy->machine, d.notes);
-    tell_unknown_forces(options, healthy->unknown, d.notes);
+    tell_unknown_forces(options, healthy->unknown, !declared.commissioned.empty(), d.notes);
   } else {
     d = diagnose(of, asked, keep_going);
   }

@@ -17,6 +17,7 @@
 #include "diagnosis/search/freed_number.hpp"
 #include "diagnosis/search/intervals.hpp"
 #include "diagnosis/search/law_search.hpp"
+#include "diagnosis/search/refit.hpp"
 #include "diagnosis/search/screening.hpp"
 #include "diagnosis/search/trial.hpp"
 #include "diagnosis/verdict.hpp"
@@ -227,11 +228,13 @@ class Report {
       const auto released = std::find_if(found().released.begin(), found().released.end(),
                                          [&](const ReleasedNumber& r) { return r.key == key; });
       if (released == found().released.end()) {
-        if (!n.common() && !is_clamping(key) && std::abs(n.pull()) > options_.out_of_tolerance)
+        const double pull = std::abs(n.pull());
+        if (!n.common() && !is_clamping(key) && pull > options_.out_of_tolerance)
           pulled_.push_back(fmt::format(
-              "{} fits best at {:.4g}, {:.1f} tolerances from what is declared ({:.4g}), but that "
+              "{} fits best {} {:.4g}, {:.1f} tolerances from what is declared ({:.4g}), but that "
               "explains too little to count.",
-              key, n.value, std::abs(n.pull()), n.centre));
+              key, pull > kFarthestPull - 0.05 ? "beyond the furthest it is let go," : "at",
+              n.value, pull, n.centre));
         continue;
       }
       FoundEffect e;

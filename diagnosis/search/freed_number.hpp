@@ -71,6 +71,10 @@ enum class Against { declaration, healthy_run };
 ///                                              in diameter grows by 0.6 um in 1 K
 ///   drift of a linear axis                     3 um with 1200 s: 0.15 um/min
 ///
+/// `other` with what `fitted` has otherwise than declared, but for what it says itself: numbers of
+/// a file that are as declared.
+Machine with_fitted(Machine other, const Machine& declared, const Machine& fitted);
+
 /// Against the declaration, those that the machine lists as uncertain are as uncertain as it says:
 /// free, of another tolerance, or exact and no nuisance at all. Of a change between two runs of one
 /// machine that says nothing. Only numbers that can show in the run matter; the others stay at

@@ -429,7 +429,9 @@ TEST(Diagnose, NotesAPullThatExplainsTooLittle) {
   const Diagnosis noted = so_much(1, 1e5);
   EXPECT_TRUE(noted.effects.empty());
   ASSERT_EQ(noted.notes.size(), 1U) << to_text(noted);
-  EXPECT_EQ(noted.notes[0].find("axes.X.load_kg fits best at 500.6, 6.0 tolerances"), 0U)
+  EXPECT_EQ(noted.notes[0].find(
+                "axes.X.load_kg fits best beyond the furthest it is let go, 500.6, 6.0 tolerances"),
+            0U)
       << noted.notes[0];
   EXPECT_NE(noted.notes[0].find("explains too little to count"), std::string::npos);
   EXPECT_TRUE(so_much(0.3, usual).notes.empty());

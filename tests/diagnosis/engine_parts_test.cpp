@@ -968,6 +968,27 @@ TEST(Nuisances, AreAsUncertainAsTheMachineSays) {
   EXPECT_EQ(number_among(change, "axes.X.kv_per_s"), nullptr);
 }
 
+TEST(Nuisances, ARotorIsTheSameInBothRuns) {
+  const std::string rotor = "axes.X.motor_inertia_kgm2", load = "axes.X.load_kg";
+  EXPECT_NE(number_among(nuisances({}), rotor), nullptr);
+  EXPECT_EQ(number_among(nuisances({}, Against::healthy_run), rotor), nullptr);
+  EXPECT_NE(number_among(nuisances({}, Against::healthy_run), load), nullptr);
+}
+
+TEST(FreedNumber, WhatWasFittedHoldsInAMachineThatSaysNothingElse) {
+  Machine declared;
+  declared.axes[kX].servo.position_lag = 250e-6;
+  Machine fitted = declared, other = declared;
+  fitted.axes[kX].servo.position_lag = 80e-6;
+  fitted.axes[kY].servo.feedforward_lag = 460e-6;
+  move_number(fitted, "effects.setup.piece_offset.shift_um.x", 12);
+  other.axes[kY].servo.feedforward_lag = 100e-6;  // said otherwise
+  const Machine with = with_fitted(other, declared, fitted);
+  EXPECT_NEAR(with.axes[kX].servo.position_lag, 80e-6, 1e-15);
+  EXPECT_EQ(with.axes[kY].servo.feedforward_lag, 100e-6);
+  EXPECT_NEAR(number_of(with, "effects.setup.piece_offset.shift_um.x"), 12, 1e-9);
+}
+
 /// Neither ball nor ring is another one, but either may be warmer.
 TEST(Nuisances, BallAndGaugeAreAsUncertainBetweenTwoRuns) {
   const std::string key = "effects.probe.tip_radius.larger_um";
