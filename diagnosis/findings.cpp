@@ -326,20 +326,27 @@ class Report {
     move_number(d_.found, key, value);
   }
 
-  /// Declared numbers and where the piece lies were fitted beside what is not told: anew, without.
+  /// Declared numbers and where the piece lies were fitted beside what is not told: anew, without,
+  /// along their sensitivities until that leaves no less.
   void fit_what_is_told() {
+    constexpr int kSteps = 6;
     LinearPart linear = without(found().nuisances, held_);
-    const Column residual = evidence_.residual(evidence_.predict(d_.found));
-    const Ground ground(evidence_, residual, linear);
-    const Eigen::VectorXd step =
-        linear_step(ground.grams.fitted, ground.grams.held_out, ground.precision, ground.offset)
-            .step;
-    for (std::size_t i = 0; i < linear.numbers.size(); ++i)
-      linear.numbers[i].value +=
-          step[static_cast<Eigen::Index>(i)] * linear.numbers[i].number.typical;
-    d_.found = with(d_.found, linear.numbers);
-    told_held_out_ =
-        evidence_.chi2(evidence_.residual(evidence_.predict(d_.found)), Role::held_out);
+    Column residual = evidence_.residual(evidence_.predict(d_.found));
+    told_held_out_ = evidence_.chi2(residual, Role::held_out);
+    for (int i = 0; i < kSteps; ++i) {
+      const Ground ground(evidence_, residual, linear);
+      for (std::size_t n = 0; n < linear.numbers.size(); ++n)
+        linear.numbers[n].value +=
+            ground.step[static_cast<Eigen::Index>(n)] * linear.numbers[n].number.typical;
+      const Machine next = with(d_.found, linear.numbers);
+      residual = evidence_.residual(evidence_.predict(next));
+      const double left = evidence_.chi2(residual, Role::held_out);
+      if (!(left < told_held_out_)) break;
+      const double gained = told_held_out_ - left;
+      d_.found = next;
+      told_held_out_ = left;
+      if (gained < options_.least_gain) break;
+    }
   }
 
   void tell_slip() {
