@@ -19,6 +19,12 @@
 
 namespace vcnc {
 
+inline constexpr double kAsGood = 0.99;   ///< part of a gain that is as much before all is fitted
+inline constexpr double kNearLoss = 0.8;  ///< part of what an effect is worth, promised by a rival
+/// Of what is left: what a further effect than few must gain, or another one in place of one.
+inline constexpr double kHalf = 0.5;
+inline constexpr double kClearlySimpler = 0.5;  ///< numbers
+
 /// What a candidate came to.
 struct Contender {
   std::size_t candidate = 0;

@@ -13,12 +13,6 @@
 
 namespace vcnc {
 
-/// Part of a gain that is as much before all is fitted, and one that a rival must promise.
-inline constexpr double kAsGood = 0.99, kNearLoss = 0.8;
-inline constexpr double kHalf =
-    0.5;  ///< of what is left: for a further effect than few, or another
-inline constexpr double kClearlySimpler = 0.5;  ///< numbers
-
 /// Whether two effects that make `one` and `other` of chi-square, and `both` together, take each
 /// other back: what they explain is what they differ by, and the rest is anybody's.
 bool take_each_other_back(double one, double other, double both);

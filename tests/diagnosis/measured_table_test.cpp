@@ -102,6 +102,15 @@ TEST(MeasuredTable, ALineOfASpreadsheetTellsTheSeparator) {
   EXPECT_EQ(table.line.front(), 3u);
 }
 
+TEST(MeasuredTable, ARowOfUnitsIsKeptBesideTheNames) {
+  const MeasuredTable table = parse_text_table("t;q\nms;um\n0;1\n1;2\n", "run.csv");
+  ASSERT_EQ(table.columns.size(), 2u);
+  EXPECT_EQ(table.columns[0].unit, "ms");
+  EXPECT_EQ(table.columns[1].unit, "um");
+  EXPECT_EQ(table.rows(), 2u);
+  EXPECT_EQ(parse_text_table("t;q\n0;1\n", "run.csv").columns[1].unit, "");
+}
+
 TEST(MeasuredTable, RefusesWithLineAndReason) {
   EXPECT_NE(refusal("t;q\n0;1,5\n")
                 .find("run.csv:2: \"1,5\" in column \"q\" has a decimal comma; if all "
