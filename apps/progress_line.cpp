@@ -10,7 +10,8 @@ namespace vcnc {
 ProgressLine::ProgressLine() : terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 void ProgressLine::show(const std::string& text) {
-  if (!terminal_) return;
+  if (!terminal_ || (shown_ && text == text_)) return;
+  text_ = text;
   winsize size{};
   ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size);
   const std::size_t width = size.ws_col > 1 ? size.ws_col - 1u : 79u;

@@ -82,6 +82,7 @@ std::vector<Dimension> dimensions(ColumnKind kind, bool rotary) {
     case ColumnKind::position:
     case ColumnKind::motor_position:
     case ColumnKind::load_position:
+    case ColumnKind::following_error:
     case ColumnKind::twist:
       break;
   }
@@ -308,9 +309,9 @@ void check_signal(const ImportMap& map, const ImportMap::Signal& s, const Refusa
   if (s.column.empty() && s.number == 0) refuse("column", "is missing");
   if (!s.lines.contains("kind"))
     refuse("kind",
-           "is missing; allowed command, position, motor_position, load_position, twist, "
-           "velocity, force, applied_force, added_force, deflection, bar, tool_position, cosine, "
-           "sine, temperature, clock");
+           "is missing; allowed command, position, motor_position, load_position, "
+           "following_error, twist, velocity, force, applied_force, added_force, deflection, bar, "
+           "tool_position, cosine, sine, temperature, clock");
   if (s.sign == 0) refuse("sign", "0 is not possible, allowed 1 or -1");
   if (s.scale == 0) refuse("scale", "0 would make every value the same");
   if (of_nothing(s.kind)) {
@@ -358,6 +359,15 @@ void check_signals(const ImportMap& map, const std::string& name) {
       return seen.contains({kind, place.probe, place.axis});
     };
     const bool closed = has(ColumnKind::position);
+    if (s.kind == ColumnKind::following_error) {
+      if (!has(ColumnKind::command))
+        refuse("kind", fmt::format("a following_error of {} says where it is beside its command, "
+                                   "which is not given",
+                                   s.axis));
+      if (closed || has(ColumnKind::motor_position) || has(ColumnKind::load_position))
+        refuse("kind",
+               fmt::format("{} has a position as well; one of the two is too many", s.axis));
+    }
     if (s.kind == ColumnKind::twist &&
         (has(ColumnKind::motor_position) || has(ColumnKind::load_position)))
       refuse("kind", fmt::format("the twist of {} follows from its two positions, which are given "
@@ -399,6 +409,8 @@ std::string_view to_string(ImportMap::Kind kind) {
       return "motor_position";
     case ColumnKind::load_position:
       return "load_position";
+    case ColumnKind::following_error:
+      return "following_error";
     case ColumnKind::twist:
       return "twist";
     case ColumnKind::velocity:

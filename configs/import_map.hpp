@@ -47,19 +47,20 @@ using KeyLines = std::map<std::string, int, std::less<>>;
 
 struct ImportMap {
   enum class Kind {
-    command,         ///< position the axis was told to have
-    position,        ///< by the measuring system the loop is closed with
-    motor_position,  ///< by an encoder on the motor, told on the load side
-    load_position,   ///< by a scale or an encoder on the load
-    twist,           ///< load side minus motor side
-    velocity,        ///< of the axis; for checks only
-    force,           ///< of the drive on the load: force, torque, or current times a constant
-    applied_force,   ///< known, on the load beside that of the drive
-    added_force,     ///< known, added by the controller to its demand: part of force
-    deflection,      ///< of the probe
-    bar,             ///< length of a ball bar less its nominal one
-    tool_position,   ///< of the tool centre in the frame of the table
-    cosine,          ///< raw signal of the probe or of an encoder
+    command,          ///< position the axis was told to have
+    position,         ///< by the measuring system the loop is closed with
+    motor_position,   ///< by an encoder on the motor, told on the load side
+    load_position,    ///< by a scale or an encoder on the load
+    following_error,  ///< command less position
+    twist,            ///< load side minus motor side
+    velocity,         ///< of the axis; for checks only
+    force,            ///< of the drive on the load: force, torque, or current times a constant
+    applied_force,    ///< known, on the load beside that of the drive
+    added_force,      ///< known, added by the controller to its demand: part of force
+    deflection,       ///< of the probe
+    bar,              ///< length of a ball bar less its nominal one
+    tool_position,    ///< of the tool centre in the frame of the table
+    cosine,           ///< raw signal of the probe or of an encoder
     sine,
     temperature,
     clock  ///< time stamps of the device itself
@@ -121,6 +122,7 @@ struct ImportMap {
                     {"position", Kind::position},
                     {"motor_position", Kind::motor_position},
                     {"load_position", Kind::load_position},
+                    {"following_error", Kind::following_error},
                     {"twist", Kind::twist},
                     {"velocity", Kind::velocity},
                     {"force", Kind::force},

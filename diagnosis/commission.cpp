@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <numeric>
 
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/records/measured_table.hpp"
@@ -26,6 +27,7 @@ constexpr double kFixed = 1e12;  ///< precision of a number that stays
 /// What a gain, an effect of the probe or of the geometry must explain of what is left: less than
 /// that is the form of friction or of the contact.
 constexpr double kShareOfLeft = 0.05;
+constexpr double kShareOfSide = 0.02;   ///< the same of friction that is on the motor's side
 constexpr double kWellOff = 10;         // times the noise
 constexpr double kNothing = 1e-3;       // of a typical size
 constexpr double kNearlyAsGood = 0.95;  ///< of the most that one promises: as good
@@ -249,24 +251,58 @@ class Commissioner {
   }
 
   void fit_friction(const std::string& place) {
-    std::vector<FittedMachine> trials(kFrictionLaws.size(), machine_);
-    evidence_.each_together(trials.size(), [&](std::size_t i) {
-      const std::vector<std::size_t> law = the(kFrictionLaws[i].effects, place);
-      if (law.empty()) return;
-      const FittedMachine begun = with_candidates(candidates_, machine_, law);
-      trials[i] = begun;
-      converge(evidence_, trials[i]);
-      if (nothing_moved(begun.numbers(), trials[i].numbers())) trials[i] = machine_;
-    });
-    const FittedMachine* best = &machine_;
-    for (const FittedMachine& trial : trials)
-      if (gains_enough(*best, trial)) best = &trial;
-    if (best == &machine_) return;
-    const auto law = static_cast<std::size_t>(best - trials.data());
-    accept(std::move(trials[law]), place, kFrictionLaws[law].name);
+    before_friction_ = machine_;
+    auto [best, law] = with_friction(place, {});
+    if (law.empty()) return;
+    accept(std::move(best), place, law);
+    fit_friction_of_motor(place);
   }
 
-  /// Of those that promise nearly the most, the first with the fewest numbers.
+  /// The axis as it was before its friction was fitted, with the law that does best and with what
+  /// is fitted beside it; without a name where none does anything.
+  std::pair<FittedMachine, std::string> with_friction(
+      const std::string& place, const std::vector<std::size_t>& beside) const {
+    const FittedMachine& from = before_friction_;
+    std::vector<FittedMachine> trials(kFrictionLaws.size(), from);
+    evidence_.each_together(trials.size(), [&](std::size_t i) {
+      std::vector<std::size_t> law = the(kFrictionLaws[i].effects, place);
+      if (law.empty()) return;
+      law.insert(law.end(), beside.begin(), beside.end());
+      const FittedMachine begun = with_candidates(candidates_, from, law);
+      trials[i] = begun;
+      converge(evidence_, trials[i]);
+      if (nothing_moved(begun.numbers(), trials[i].numbers())) trials[i] = from;
+    });
+    const FittedMachine* best = &from;
+    for (const FittedMachine& trial : trials)
+      if (gains_enough(*best, trial)) best = &trial;
+    if (best == &from) return {};
+    const auto law = static_cast<std::size_t>(best - trials.data());
+    return {std::move(trials[law]), kFrictionLaws[law].name};
+  }
+
+  /// Friction that was fitted without a gain may imitate it so well that no way leads from there to
+  /// the gain: both anew.
+  void fit_friction_with(std::size_t gain, const std::string& place) {
+    if (!candidates_[gain].of_loops) return;
+    auto [better, law] = with_friction(place, {gain});
+    if (law.empty() || !gains_enough(machine_, better, kShareOfLeft) || is_as_declared(better) ||
+        stands_for_force(better))
+      return;
+    accept(std::move(better), place, law + " with " + told(candidates_[gain]));
+  }
+
+  /// Of an elastic transmission, what part of its friction is before it.
+  void fit_friction_of_motor(const std::string& place) {
+    const std::vector<std::size_t> motor = the({"motor_friction"}, place);
+    if (motor.empty()) return;
+    FittedMachine better = with_candidates(candidates_, machine_, motor);
+    converge(evidence_, better);
+    if (gains_enough(machine_, better, kShareOfSide))
+      accept(std::move(better), place, "part of its friction on the motor's side");
+  }
+
+  /// Of those that leave nearly the least, the first with the fewest numbers.
   std::ptrdiff_t simplest_of_best(const std::vector<std::size_t>& candidates,
                                   const std::vector<double>& promise) const {
     const auto first = std::min_element(promise.begin(), promise.end());
@@ -302,7 +338,25 @@ class Commissioner {
     return b && b->contradicts();
   }
 
-  /// One after the other, the one first that promises most.
+  /// Of those that promise half of the most, the best few: sensitivities do not tell which of them
+  /// does best when it is fitted.
+  std::vector<std::size_t> promising(const std::vector<std::size_t>& candidates,
+                                     const std::vector<double>& promise) const {
+    constexpr std::size_t kFew = 3;
+    constexpr double kHalfAsGood = 0.5;
+    std::vector<std::size_t> order(candidates.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t x, std::size_t y) { return promise[x] < promise[y]; });
+    const double enough =
+        machine_.held_out - kHalfAsGood * (machine_.held_out - promise[order.front()]);
+    std::vector<std::size_t> few{candidates[order.front()]};
+    for (std::size_t k = 1; k < order.size() && few.size() < kFew; ++k)
+      if (promise[order[k]] <= enough) few.push_back(candidates[order[k]]);
+    return few;
+  }
+
+  /// One after the other, the one first that does best.
   void fit_best_of(std::vector<std::size_t> left, const std::string& place,
                    const std::function<bool()>& go_on) {
     while (!left.empty() && go_on()) {
@@ -311,13 +365,22 @@ class Commissioner {
         promise[i] =
             promised(evidence_, machine_, with_candidates(candidates_, machine_, {left[i]}));
       });
-      const auto best = left.begin() + simplest_of_best(left, promise);
-      FittedMachine better = with_candidates(candidates_, machine_, {*best});
-      converge(evidence_, better);
+      const std::vector<std::size_t> few = promising(left, promise);
+      std::vector<FittedMachine> fitted(few.size());
+      std::vector<double> leaves(few.size());
+      evidence_.each_together(few.size(), [&](std::size_t i) {
+        fitted[i] = with_candidates(candidates_, machine_, {few[i]});
+        converge(evidence_, fitted[i]);
+        leaves[i] = fitted[i].held_out;
+      });
+      const auto best = static_cast<std::size_t>(simplest_of_best(few, leaves));
+      FittedMachine& better = fitted[best];
       if (!gains_enough(machine_, better, kShareOfLeft)) return;
-      if (!is_as_declared(better) && !stands_for_force(better))
-        accept(std::move(better), place, told(candidates_[*best]));
-      left.erase(best);
+      std::erase(left, few[best]);
+      if (is_as_declared(better))
+        fit_friction_with(few[best], place);
+      else if (!stands_for_force(better))
+        accept(std::move(better), place, told(candidates_[few[best]]));
     }
   }
 
@@ -376,6 +439,7 @@ class Commissioner {
   Evidence evidence_;
   ControllerCheck controller_;
   FittedMachine machine_;  ///< added: what was found on the axis in work
+  FittedMachine before_friction_;
   Commissioning result_;
 };
 

@@ -1,5 +1,7 @@
 #include "diagnosis/diagnose.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -151,7 +153,8 @@ struct Attempt {
       if (c.hides_drive()) evidence.leave_out_drive(c.axis);
     options = fitting(asked, evidence, difference, left, before.chatter);
     selection = select_effects_of(evidence, declared, of.candidates, options, keep_going);
-    bring_to_simplest_form(evidence, declared, options, selection.floor, selection.found);
+    if (!selection.interrupted)
+      bring_to_simplest_form(evidence, declared, options, selection.floor, selection.found);
   }
   Attempt(const Attempt&) = delete;  // what was selected refers to the evidence
 
@@ -160,6 +163,48 @@ struct Attempt {
   DiagnosisOptions options;
   SelectionResult selection;
 };
+
+/// What counts for the form of a model that was fitted to a healthy run, and what is beyond that
+/// though nothing is told.
+void tell_form_of_fitted(const std::vector<double>& left,
+                         const std::vector<ComparedChannel>& channels, Diagnosis& d) {
+  constexpr double kBeyondLeft = 1.3;
+  d.notes.push_back(
+      "As much as the model left of the healthy run that it was fitted to counts for its form and "
+      "needs no cause.");
+  if (d.verdict != DiagnosisVerdict::no_deviation) return;
+  for (const SignalFigure& f : d.figures)
+    for (std::size_t c = 0; c < left.size(); ++c) {
+      const double was = std::hypot(left[c], f.floor);
+      if (f.run != "held-out laps" || f.channel != channels[c] || f.after <= kBeyondLeft * was)
+        continue;
+      const ShownUnit unit = shown_unit(f.channel);
+      d.warnings.push_back(fmt::format(
+          "{} is off by {:.3g} {} rms, {:.2g} times what the model left of the healthy run that it "
+          "was fitted to ({:.3g}): something may have changed that this model is too coarse to "
+          "tell; give the healthy run as --reference.",
+          channel_name(f.channel), f.after * unit.factor, unit.name, f.after / was,
+          was * unit.factor));
+    }
+}
+
+/// Stopped while laws are sought, too: then without them.
+Diagnosis findings_of_search(const DiagnosisCase& of, Attempt& search, bool differential,
+                             const KeepGoing& keep_going) {
+  const auto findings = [&] {
+    return findings_of(of, search.evidence, search.options, search.selection, search.before,
+                       differential);
+  };
+  if (search.selection.interrupted || !keep_going) return findings();
+  search.evidence.stop_when([&] { return !keep_going({"telling what was found", 1}); });
+  try {
+    return findings();
+  } catch (const Stopped&) {
+    search.selection.interrupted = true;
+    search.evidence.stop_when({});
+    return findings();
+  }
+}
 
 /// The record of the case is what is explained: what was measured, or `difference`.
 Diagnosis explained(const DiagnosisCase& of, const Record& raw,
@@ -202,16 +247,12 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
       if (!once_more()) break;
     }
   }
-  Diagnosis d = findings_of(of, search->evidence, search->options, std::move(search->selection),
-                            std::move(search->before), difference != nullptr);
+  Diagnosis d = findings_of_search(of, *search, difference != nullptr, keep_going);
   if (anew)
     d.notes.push_back(
         "What was found lets the encoders make more noise than in the declared machine; all was "
         "sought once more with that noise.");
-  if (!question.left.empty())
-    d.notes.push_back(
-        "As much as the model left of the healthy run that it was fitted to counts for its form "
-        "and needs no cause.");
+  if (!question.left.empty()) tell_form_of_fitted(question.left, of.replica.channels(), d);
   return d;
 }
 

@@ -75,12 +75,12 @@ bool of_measurement(const std::string& effect) {
 class Report {
  public:
   Report(const DiagnosisCase& of, const Evidence& evidence, const DiagnosisOptions& options,
-         SelectionResult selection, FoundBeforehand before, bool differential)
+         const SelectionResult& selection, const FoundBeforehand& before, bool differential)
       : of_(of),
         evidence_(evidence),
         options_(options),
-        selection_(std::move(selection)),
-        before_(std::move(before)),
+        selection_(selection),
+        before_(before),
         floor_(selection_.floor),
         inexact_(is_inexact(evidence, options, floor_, selection_.found.held_out)) {
     d_.differential = differential;
@@ -400,7 +400,13 @@ class Report {
           likely += (likely.empty() ? " So does the model, but not with that strength, with "
                                     : " or with ") +
                     of_.candidates[c.candidate].name();
-        if (likely.empty()) likely = fmt::format(" No effect on the drive of {} does so", axis);
+        if (chatter.too_many > 0)
+          likely = fmt::format(
+              " So is the model with any of {} effects: it tells nothing of the "
+              "cause",
+              chatter.too_many);
+        else if (likely.empty())
+          likely = fmt::format(" No effect on the drive of {} does so", axis);
         d_.notes.push_back(text + "." + likely + ".");
         d_.vibrations.push_back(
             chatter.has_line()
@@ -771,8 +777,8 @@ class Report {
   const DiagnosisCase& of_;
   const Evidence& evidence_;
   const DiagnosisOptions& options_;
-  SelectionResult selection_;
-  FoundBeforehand before_;
+  const SelectionResult& selection_;
+  const FoundBeforehand& before_;
   double floor_;
   bool inexact_;             ///< the model is known not to be the machine
   bool made_worse_ = false;  ///< some signal is, by what was added
@@ -804,10 +810,9 @@ std::vector<std::string> signals_made_worse(const std::vector<SignalFigure>& fig
 }
 
 Diagnosis findings_of(const DiagnosisCase& of, const Evidence& evidence,
-                      const DiagnosisOptions& options, SelectionResult selection,
-                      FoundBeforehand before, bool differential) {
-  return Report(of, evidence, options, std::move(selection), std::move(before), differential)
-      .write();
+                      const DiagnosisOptions& options, const SelectionResult& selection,
+                      const FoundBeforehand& before, bool differential) {
+  return Report(of, evidence, options, selection, before, differential).write();
 }
 
 }  // namespace vcnc

@@ -53,7 +53,7 @@ struct FoundBeforehand {
 std::vector<std::string> signals_made_worse(const std::vector<SignalFigure>& figures);
 
 Diagnosis findings_of(const DiagnosisCase& of, const Evidence& evidence,
-                      const DiagnosisOptions& options, SelectionResult selection,
-                      FoundBeforehand before, bool differential);
+                      const DiagnosisOptions& options, const SelectionResult& selection,
+                      const FoundBeforehand& before, bool differential);
 
 }  // namespace vcnc

@@ -26,6 +26,8 @@ using Kind = ImportMap::Kind;
 
 /// A run of fewer samples says nothing.
 constexpr std::size_t kFewestSamples = 100;
+/// Correlation of what an axis is ahead of its command with its speed.
+constexpr double kAhead = 0.5;
 
 constexpr double kZeroApart = 20;      // times the span of a twist, that is none of a transmission
 constexpr double kMostTwisted = 3e-3;  ///< [m or rad] that a transmission may be twisted by
@@ -82,6 +84,7 @@ class Importer {
       for (const ImportMap::Signal& s : map_.signals) add(s);
     else
       add_bar_on_arcs(by_map_, *columns_.front(), base_, record_);
+    for (MeasuredSignal& error : following_errors_) add_position(std::move(error));
     add_twists();
     check_record(record_, velocities_, declared_);
     cut();
@@ -187,6 +190,9 @@ class Importer {
         positions_[place.axis][s.kind] = record_.signals.size();
         signal.kind = SignalKind::position;
         break;
+      case Kind::following_error:
+        following_errors_.push_back(std::move(signal));
+        return;
       case Kind::twist:
         signal.kind = SignalKind::twist;
         break;
@@ -232,6 +238,34 @@ class Importer {
     if (signal.kind == SignalKind::position || signal.kind == SignalKind::command)
       check_jumps(column, s.kind);
     record_.signals.push_back(std::move(signal));
+  }
+
+  /// Of an axis of which it is known how far it is behind its command.
+  void add_position(MeasuredSignal error) {
+    const MeasuredSignal& command = *record_.find(SignalKind::command, error.axis);
+    tell_if_ahead(error, command);
+    MeasuredSignal position = std::move(error);
+    position.kind = SignalKind::position;
+    for (std::size_t k = 0; k < base_.samples; ++k)
+      position.value[k] = command.value[k] - position.value[k];
+    position.source = fmt::format("{} - {}", command.source, position.source);
+    positions_[position.axis][Kind::position] = record_.signals.size();
+    record_.signals.push_back(std::move(position));
+  }
+
+  /// No drive without feed-forward is ahead of its command.
+  void tell_if_ahead(const MeasuredSignal& error, const MeasuredSignal& command) {
+    double both = 0, own = 0, moved = 0;
+    for (std::size_t k = 1; k < base_.samples; ++k) {
+      const double v = command.value[k] - command.value[k - 1], e = error.value[k];
+      if (std::isfinite(v * e)) both += v * e, own += e * e, moved += v * v;
+    }
+    if (!(both < -kAhead * std::sqrt(own * moved))) return;
+    warn(
+        fmt::format("by \"{}\" {} goes ahead of its command: a following error is command less "
+                    "position; if the "
+                    "controller counts the other way, say sign = -1",
+                    error.source, kAxisNames[error.axis]));
   }
 
   void check_jumps(const MeasuredColumn& c, Kind kind) const {
@@ -377,6 +411,7 @@ class Importer {
   std::size_t rows_ = 0, temperatures_ = 0;
   std::map<std::size_t, std::map<Kind, std::size_t>> positions_;  // axis: kind: signal
   std::vector<MeasuredSignal> velocities_;                        // for checks only
+  std::vector<MeasuredSignal> following_errors_;
   TimeBase base_;
   Record record_;
 };

@@ -174,6 +174,15 @@ class Checker {
     return s ? s : record_.find(SignalKind::command, axis);
   }
 
+  /// Whether an axis was told to stay where it is, and did: what it trembles by tells nothing.
+  bool stands(std::size_t axis) const {
+    constexpr double kTrembles = 20e-6;  // [m or rad]
+    const MeasuredSignal *command = record_.find(SignalKind::command, axis),
+                         *position = record_.find(SignalKind::position, axis);
+    return command && position && constant(command->value) &&
+           spread_of(position->value).span() < kTrembles;
+  }
+
   /// Warns of values that stand alone far off both neighbours: no machine moves so.
   void check_lone(const MeasuredSignal& s) {
     const std::vector<double>& x = s.value;
@@ -228,8 +237,9 @@ class Checker {
       const bool raw = s.kind == SignalKind::cosine || s.kind == SignalKind::sine;
       if (is_compared(s.kind) || raw) ++compared, still += is_constant;
       const bool told = s.kind == SignalKind::applied_force || s.kind == SignalKind::added_force;
-      const bool stands = record_.on_table && s.kind == SignalKind::command;  // across its plane
-      if (is_constant && s.kind != SignalKind::temperature && !told && !stands)
+      const bool at_rest = s.kind != SignalKind::temperature && s.kind != SignalKind::clock &&
+                           !is_reading(s.kind) && !raw && stands(s.axis);
+      if (is_constant && s.kind != SignalKind::temperature && !told && !at_rest)
         warn(fmt::format("{} is constant; nothing can be learnt from it", name(s)));
       if (told && !record_.find(SignalKind::command, s.axis) && !is_followed(record_, s.axis))
         warn(fmt::format("{} is not used: no command of {} is known", name(s), kAxisNames[s.axis]));
@@ -241,7 +251,7 @@ class Checker {
         s.resolution = 0;
       if (s.kind == SignalKind::command && !are_multiples(s.value, s.resolution)) s.resolution = 0;
       const double steps = s.resolution > 0 ? spread_of(s.value).span() / s.resolution : HUGE_VAL;
-      if (steps < kFewestSteps && s.kind != SignalKind::temperature && !told)
+      if (steps < kFewestSteps && s.kind != SignalKind::temperature && !told && !at_rest)
         warn(fmt::format("{} comes in {:.0f} coarse steps of {:.3g} (SI)", name(s), steps,
                          s.resolution));
       if (s.kind == SignalKind::force || is_reading(s.kind) || raw) check_ends(s);
@@ -265,7 +275,8 @@ class Checker {
   /// Where the ball is, all axes say.
   void check_poses() {
     const auto known = [&](std::size_t axis) { return motion(axis) != nullptr; };
-    if (std::none_of(record_.signals.begin(), record_.signals.end(),
+    if (record_.on_table ||
+        std::none_of(record_.signals.begin(), record_.signals.end(),
                      [](const MeasuredSignal& s) { return is_reading(s.kind); }) ||
         (known(kX) && known(kY) && known(kZ)))
       return;
@@ -298,6 +309,7 @@ class Checker {
 
   void check_velocity(const MeasuredSignal& s) {
     const MeasuredSignal* own = motion(s.axis);
+    if (stands(s.axis)) return;
     if (constant(s.value)) warn(speed_name(s) + " is constant");
     if (!own || constant(own->value) || constant(s.value)) return;
     const Series measured = smoothed(s.value, half_);
@@ -436,8 +448,10 @@ class Checker {
         refuse(fmt::format("{} follows {}, not {}: the columns are swapped", name(s), name(*c),
                            name(*own)));
     }
-    warn(fmt::format("{} hardly follows {} (correlation of their speeds {:.2f})", name(s),
-                     name(*own), r.correlation));
+    warn(
+        fmt::format("{} hardly follows {} (correlation of their speeds {:.2f}); what an axis is "
+                    "behind its command is of kind following_error",
+                    name(s), name(*own), r.correlation));
   }
 
   /// No drive follows without error.
@@ -497,7 +511,7 @@ class Checker {
     if (speed > 1.1)
       warn(fmt::format("{} moves at {:.4g} {}/s, above the declared limit of {:.4g}", name(s),
                        fastest, unit, l.velocity));
-    if (share > 0 && share < 1e-3 && speed < 1e-3)
+    if (share > 0 && share < 1e-3 && speed < 1e-3 && !stands(s.axis))
       warn(
           fmt::format("{} spans {:.4g} {} only, {:.2g} of the declared travel; check the unit "
                       "(1000: m and mm{})",
@@ -633,7 +647,7 @@ class Checker {
   void check_force(const MeasuredSignal& s) {
     check_force_limit(s);
     const MeasuredSignal* own = motion(s.axis);
-    if (!own || constant(own->value) || constant(s.value)) return;
+    if (!own || constant(own->value) || constant(s.value) || stands(s.axis)) return;
     const auto fit = fit_force(s, *own);
     if (!fit) return;
     if (fit->explained < 0.3) {

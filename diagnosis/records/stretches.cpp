@@ -22,6 +22,7 @@ constexpr double kShortestStretch = 0.1;  // [s]
 constexpr double kLeastTravel = 2e-3;     // [m or rad] of a lap
 constexpr double kSearchStep = 20e-3;     // [s] between samples at which a lap may begin
 constexpr std::size_t kShares = 16;       // at which stretches are compared
+constexpr double kRemembered = 0.3;       // [s] that a drive remembers
 // Of two laps that are apart by more than this part of their way, or by more than this [m or rad]
 // where there is none, one does another motion.
 constexpr double kOtherWay = 0.1, kNoWay = 1e-3;
@@ -261,6 +262,17 @@ class Segmentation {
   std::vector<Stretch> stretches_;
 };
 
+/// Whether the commands of so many samples before two laps are the same; before a record begins,
+/// all axes stand.
+bool came_from_the_same(const Curve5& curve, std::size_t a, std::size_t b, std::size_t samples) {
+  for (std::size_t k = 1; k <= samples; ++k) {
+    const std::size_t i = a > k ? a - k : 0, j = b > k ? b - k : 0;
+    const double blur = 2 * curve.speed(i) * curve.period();  // laps begin between samples
+    if (curve.distance(i, static_cast<double>(j)) > kSameRoughly + blur) return false;
+  }
+  return true;
+}
+
 /// 0 where there is nothing.
 double mean_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) /
@@ -282,6 +294,17 @@ const MeasuredSignal* way_of(const Record& record, std::size_t axis) {
 }
 
 }  // namespace
+
+std::size_t run_in(const Record& record, const std::vector<Stretch>& laps) {
+  const Curve5 curve(record);
+  if (curve.empty() || laps.empty()) return 0;
+  const Stretch& first = laps.front();
+  const auto settling = static_cast<std::size_t>(kRemembered / record.period);
+  const bool alike = std::all_of(laps.begin() + 1, laps.end(), [&](const Stretch& lap) {
+    return came_from_the_same(curve, first.begin, lap.begin, settling);
+  });
+  return alike ? 0 : std::min(settling, (first.end - first.begin) / 2);
+}
 
 bool same_way(const Record& a, const Stretch& of_a, const Record& b, const Stretch& of_b,
               At place) {

@@ -26,6 +26,11 @@ std::vector<char> moving(const Record& record, std::size_t axis);
 /// In order of time, not overlapping; empty where no command is known.
 std::vector<Stretch> stretches_of(const Record& record);
 
+/// Samples from the beginning of laps of one condition on that still hold what came before, which
+/// was not the same before all of them: the first of several laps follows a ramp, the others a lap.
+/// Of 0.3 s, and no more than half a lap; 0 where all came from the same, or no command is known.
+std::size_t run_in(const Record& record, const std::vector<Stretch>& laps);
+
 enum class At { any_place, the_same_place };
 
 /// Whether all axes go the same way in both, as far as the shorter one lasts: where they were told

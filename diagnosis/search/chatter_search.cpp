@@ -25,7 +25,8 @@ constexpr double kAsStrong = 3;
 /// The same of a position that follows from the force, F / (m w^2).
 constexpr double kFollows = kAsStrong * kFrequency * kFrequency;
 constexpr double kSizes[] = {1.0 / 16, 0.25, 1, 4};
-constexpr double kBetween = 2;  ///< from one size to where the next begins
+constexpr double kBetween = 2;           ///< from one size to where the next begins
+constexpr std::size_t kMostCauses = 12;  ///< of what has no line
 
 bool is_of_drive(const Candidate& c, std::size_t axis) {
   return c.place == kAxisNames[axis] && is_of_drive(c);
@@ -80,7 +81,8 @@ class ChatterSearch {
 
   /// Nothing but the axis where its drive is as it was.
   Chatter chatter_of(std::size_t axis) const {
-    Chatter c{.axis = axis, .line = {}, .of_model = false, .unrest = {}, .causes = {}};
+    Chatter c{
+        .axis = axis, .line = {}, .of_model = false, .unrest = {}, .causes = {}, .too_many = 0};
     for (const Unrest& u : measured_) {
       const double was = before(healthy_, u);
       if (!is_of_drive(u.channel, axis) || was <= 0 || !u.rms || *u.rms < c.times * was) continue;
@@ -101,6 +103,10 @@ class ChatterSearch {
         (c.causes.empty() || !c.causes.front().as_strong)) {
       c.line = {};
       c.causes = c.is_restless() ? causes_of(c) : std::vector<ChatterCause>{};
+    }
+    if (!c.has_line() && c.causes.size() > kMostCauses) {
+      c.too_many = c.causes.size();
+      c.causes.clear();
     }
     return c;
   }

@@ -21,7 +21,8 @@
 // axis stands, where no lap is compared. Then the drive is more restless than in the healthy run
 // (unrest.hpp), three times as much in some signal. Causes are those candidates that make the model
 // as restless in every signal under the same condition, in motion or at rest, as strongly as above;
-// without any, the drive is as good as any other.
+// without any, the drive is as good as any other, and so it is where more than a dozen do, which
+// tells nothing of what it is.
 //
 // Validity: frequencies below half the rate of the record; an axis of which the position or the
 // force is recorded. Limit cycles of play: Nordin & Gutman, Automatica 38 (2002) 1633-1649.
@@ -54,6 +55,7 @@ struct Chatter {
   Unrest unrest;                     ///< that of its signals which has grown most
   double times = 0;                  ///< what it was in the healthy run
   std::vector<ChatterCause> causes;  ///< the likest first; none: something outside the drive
+  std::size_t too_many = 0;          ///< causes that were, and tell nothing
 
   bool has_line() const { return line.strength > 0; }
   bool is_restless() const;

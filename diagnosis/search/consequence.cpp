@@ -25,6 +25,17 @@ Difference difference(const Evidence& evidence, const Prediction& a, const Predi
   return d;
 }
 
+/// Whether a predicted position goes anywhere.
+bool goes_anywhere(const Evidence& evidence, const std::vector<double>& position) {
+  constexpr double kFar = 1e-3;  // [m]
+  double low = HUGE_VAL, high = -HUGE_VAL;
+  for (const RecordBlock& block : evidence.partition().blocks)
+    for (std::size_t k = block.begin; k < block.end; ++k)
+      if (std::isfinite(position[k]))
+        low = std::min(low, position[k]), high = std::max(high, position[k]);
+  return high - low > kFar;
+}
+
 /// Sum of squares of what a tool position changes by across the way it goes, or at all where it
 /// stands.
 Difference across_the_way(const Evidence& evidence, const Prediction& a, const Prediction& b,
@@ -58,14 +69,14 @@ Consequence consequence(const Evidence& evidence, const Prediction& a, const Pre
                                   [](const auto& c) { return is_reading(c.kind); });
   Consequence of;
   double sum = 0, n = 0;  // of the contour
-  std::vector<std::size_t> tool;
+  std::vector<std::size_t> tool, linear;
   for (std::size_t c = 0; c < channels.size(); ++c) {
     const Difference d = difference(evidence, a, b, c);
     const bool reading = is_reading(channels[c].kind);
     if (channels[c].kind == SignalKind::tool_position) tool.push_back(c);
-    const bool contour =
-        probed ? reading : channels[c].kind == SignalKind::position && !is_rotary(channels[c].axis);
-    if (contour) {
+    const bool of_linear = channels[c].kind == SignalKind::position && !is_rotary(channels[c].axis);
+    if (of_linear && goes_anywhere(evidence, b[c])) linear.push_back(c);
+    if (probed ? reading : of_linear) {
       sum += d.sum;
       n = std::max(n, d.n);
     }
@@ -75,6 +86,8 @@ Consequence consequence(const Evidence& evidence, const Prediction& a, const Pre
     of.of_noise = std::max(of.of_noise, share);
     if (!reading) of.of_noise_but_readings = std::max(of.of_noise_but_readings, share);
   }
+  // A single axis has no contour but its position.
+  if (!probed && linear.size() > 1) tool = linear;
   if (!tool.empty()) {
     const Difference d = across_the_way(evidence, a, b, tool);
     sum = d.sum;

@@ -63,9 +63,8 @@ struct ContestRules {
   std::vector<double> base_of;   ///< held-out chi-square per channel before anything was found
   double floor = 0;              ///< what noise leaves of held-out chi-square
   std::vector<double> floor_of;  ///< of it per channel
-  /// Told what is done and how far it is; false stops the work.
+  /// Told what is done and how far it is; false: stopped, and the next prediction throws Stopped.
   std::function<bool(const std::string&, double)> go;
-  std::function<bool()> goes_on;  ///< whether it did not
 
   double excess(double held_out) const;
   /// What a candidate must gain where so much is left.

@@ -350,6 +350,7 @@ Prediction Evidence::predict(const Machine& hypothesis) const {
 }
 
 std::vector<Prediction> Evidence::predict_all(const std::vector<Machine>& hypotheses) const {
+  if (stop_ && stop_()) throw Stopped();
   return gathering_.predict_all(hypotheses);
 }
 

@@ -18,6 +18,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -39,6 +40,9 @@ namespace vcnc {
 using BlockGrams = std::vector<Eigen::MatrixXd>;
 
 enum class Role { fitted, held_out, both };
+
+/// Thrown by a prediction that nobody waits for any more.
+struct Stopped {};
 
 /// Times that all is sought once more with less noise, what was found being none, where no laps
 /// tell the noise.
@@ -70,6 +74,10 @@ class Evidence {
   const Prediction& declared() const { return declared_; }
   /// What was left out for it: of the axis' own channels, and of the readings.
   const std::vector<LapEvent>& events() const { return events_; }
+
+  /// Asked before every prediction from now on, by any thread; where it says yes, predictions throw
+  /// Stopped. Nothing: none does. Not while others predict.
+  void stop_when(std::function<bool()> stop) { stop_ = std::move(stop); }
 
   Prediction predict(const Machine& hypothesis) const;
   /// As many at a time as are worth it.
@@ -181,6 +189,7 @@ class Evidence {
   const Record record_;
   Replica& replica_;
   mutable Gathering gathering_;
+  std::function<bool()> stop_;
   mutable RecentProducts recent_;
   Partition partition_;
   SeriesOfChannels measured_;

@@ -20,7 +20,7 @@ const FreedNumber& number_of_key(const FittedMachine& m, const std::string& key)
 
 void Exchange::exchange(FittedMachine& m) const {
   std::size_t exchanges = m.found() + 1;
-  for (std::size_t i = 0; i < m.found() && rules_.goes_on();)
+  for (std::size_t i = 0; i < m.found();)
     if (gives_way(m, i, exchanges > 0)) {
       --exchanges;
       i = 0;
@@ -82,7 +82,7 @@ bool Exchange::gives_way(FittedMachine& m, std::size_t i, bool may_give_way) con
 
 void Exchange::join(FittedMachine& m) const {
   for (std::size_t i = 0; i < m.added.size(); ++i)
-    for (std::size_t j = i + 1; j < m.added.size() && rules_.goes_on(); ++j)
+    for (std::size_t j = i + 1; j < m.added.size(); ++j)
       if (rules_.candidates[m.added[i].candidate].place ==
               rules_.candidates[m.added[j].candidate].place &&
           became_one(m, i, j))
@@ -122,7 +122,7 @@ bool Exchange::exchange_for_as_good(FittedMachine& m, std::size_t i, const Fitte
   double least = contest.intricacy(m.added[i]);
   std::vector<std::size_t> alike = m.added[i].class_with;
   for (const Contender& r : rivals) {
-    if (!rules_.goes_on() || !r.released.empty() || r.gain < kAsGood * lost ||
+    if (!r.released.empty() || r.gain < kAsGood * lost ||
         std::count(alike.begin(), alike.end(), r.candidate) > 0)
       continue;
     FittedMachine instead = less;

@@ -119,6 +119,19 @@ bool step_towards(const Evidence& evidence, FittedMachine& m, const Refit& f,
   return false;
 }
 
+/// Whether two refits of the same machine go to the same place, but for a twentieth of the way.
+bool leads_the_same_way(const Refit& a, const Refit& b) {
+  constexpr double kOfTheWay = 0.05;
+  const auto apart = [](double x, double y) {
+    return std::abs(x - y) > kOfTheWay * std::max(std::abs(x), std::abs(y));
+  };
+  for (Eigen::Index i = 0; i < a.linear_step.size(); ++i)
+    if (apart(a.linear_step[i], b.linear_step[i])) return false;
+  return std::equal(
+      a.live.begin(), a.live.end(), b.live.begin(),
+      [&](const FreedNumber& x, const FreedNumber& y) { return !apart(x.value, y.value); });
+}
+
 /// Computes everything where the machine stands.
 void stay(const Evidence& evidence, FittedMachine& m) {
   m.prediction = evidence.predict(m.machine);
@@ -329,15 +342,18 @@ void converge(const Evidence& evidence, FittedMachine& m) {
     const std::vector<FreedNumber> live = m.numbers();
     const std::vector<double> weight = weights(evidence, residual);
     const double least = misfit(evidence, residual, weight, m.nuisances.numbers);
-    double promised = 0;
-    const auto step = [&](double damping) {
-      const Refit f = refit(evidence, m.machine, live, without(m.nuisances, live),
-                            {.max_iterations = 8, .weight = weight, .damping = damping});
-      promised = least - f.fitted;
-      return step_towards(evidence, m, f, weight, least);
+    const auto promise = [&](double damping) {
+      return refit(evidence, m.machine, live, without(m.nuisances, live),
+                   {.max_iterations = 8, .weight = weight, .damping = damping});
     };
-    // What undamped steps promise and do not keep, damped ones may.
-    if (!step(0) && (promised < kMuch || !step(kDamping))) {
+    // What undamped steps promise and do not keep, damped ones may, if they are others.
+    const auto damped = [&](const Refit& undamped) {
+      if (least - undamped.fitted < kMuch) return false;
+      const Refit f = promise(kDamping);
+      return !leads_the_same_way(f, undamped) && step_towards(evidence, m, f, weight, least);
+    };
+    const Refit undamped = promise(0);
+    if (!step_towards(evidence, m, undamped, weight, least) && !damped(undamped)) {
       if (round == 0) stay(evidence, m);
       break;
     }

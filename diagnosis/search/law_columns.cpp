@@ -13,9 +13,10 @@ namespace {
 using Series = std::vector<double>;
 
 constexpr std::size_t kHats = 10;
-constexpr double kPulse = 2e-3;        // half width of the pulse [s]
-constexpr std::size_t kInstants = 64;  // at which a jump is sought first
-constexpr double kLongestJump = 5e-3;  // [s]
+constexpr double kPulse = 2e-3;           // half width of the pulse [s]
+constexpr std::size_t kInstants = 64;     // at which a jump is sought first
+constexpr std::size_t kNearInstants = 4;  // of these, the best, next to which it is sought
+constexpr double kLongestJump = 5e-3;     // [s]
 
 Law pulse(std::size_t axis, double at, double size) {
   Law law;
@@ -113,20 +114,29 @@ std::vector<Law> LawColumns::jumps(const std::function<double(const Law&)>& gain
       return jump(all[i].axis_index(), all[i].point, sample);
     };
     const std::size_t samples = evidence_.record().samples();
-    std::size_t step = samples / kInstants, best = 0;
-    double most = 0;
-    const auto take_if_better = [&](std::size_t sample) {
-      if (sample < 1 || sample + 1 >= samples) return;
-      if (const double g = gain(at(sample)); g > most) most = g, best = sample;
+    struct Instant {
+      double gain = 0;
+      std::size_t sample = 1;
     };
-    for (std::size_t k = 1; k < kInstants; ++k) take_if_better(k * step);
-    while (best > 0 && step > 1) {
-      step = (step + 1) / 2;
-      const std::size_t middle = best;
-      take_if_better(middle - std::min(step, middle));
-      take_if_better(middle + step);
-    }
-    all[i] = at(std::max<std::size_t>(1, best));
+    const auto better = [](const Instant& a, const Instant& b) { return a.gain > b.gain; };
+    const auto at_sample = [&](std::size_t sample) {
+      return Instant{sample < 1 || sample + 1 >= samples ? 0 : gain(at(sample)), sample};
+    };
+    std::vector<Instant> instants;
+    for (std::size_t k = 1; k < kInstants; ++k)
+      instants.push_back(at_sample(k * (samples / kInstants)));
+    std::stable_sort(instants.begin(), instants.end(), better);
+    instants.resize(kNearInstants);
+    // Between two of them the gain may rise steeply: the best one of all need not be next to it.
+    for (Instant& best : instants)
+      for (std::size_t step = samples / kInstants; best.gain > 0 && step > 1;) {
+        step = (step + 1) / 2;
+        const std::size_t middle = best.sample;
+        for (const std::size_t sample : {middle - std::min(step, middle), middle + step})
+          best = std::min(best, at_sample(sample), better);
+      }
+    const Instant& best = *std::min_element(instants.begin(), instants.end(), better);
+    all[i] = at(best.gain > 0 ? best.sample : 1);
   });
   return all;
 }

@@ -124,7 +124,7 @@ FittedMachine MachineChanges::with_dry_friction(FittedMachine m) const {
 }
 
 void MachineChanges::drop(FittedMachine& m) const {
-  while (rules_.goes_on()) {
+  while (true) {
     std::vector<double> loss(m.added.size());
     for (std::size_t i = 0; i < m.added.size(); ++i) loss[i] = weigh(m, i);
     if (m.added.empty()) return;

@@ -55,10 +55,12 @@ std::vector<LapNoise> lap_noise(const Partition& partition, const Series& residu
   for (const std::vector<Stretch>& of : partition.repetitions()) {
     const std::size_t length = of.front().end - of.front().begin;
     Series there(length, 0.0), mean(length, 0.0);  // laps that have a sample, and their mean
+    const auto run_in = partition.run_in.find(of.front().condition);
+    const std::size_t first = run_in == partition.run_in.end() ? 0 : run_in->second;
     for (const Stretch& s : of)
-      for (std::size_t k = 0; k < length; ++k) there[k] += std::isfinite(residual[s.begin + k]);
+      for (std::size_t k = first; k < length; ++k) there[k] += std::isfinite(residual[s.begin + k]);
     for (const Stretch& s : of)
-      for (std::size_t k = 0; k < length; ++k)
+      for (std::size_t k = first; k < length; ++k)
         if (const double r = residual[s.begin + k]; std::isfinite(r)) mean[k] += r / there[k];
     const double needed = laps_needed(there, of.size());
     for (std::size_t i = 0; i < of.size(); ++i) {

@@ -7,9 +7,10 @@
 //
 //   z_k = (r_k - sum_j a_j r_{k-j}) / s,   s such that the d_i of the held-out laps have variance 1
 //
-// so that chi-square per sample is 1 where nothing but noise is left. A disturbance that does not
-// repeat (hum, vibration) belongs to that noise; it is seen as a line in the periodogram of d_i,
-// 40 times above the running median.
+// so that chi-square per sample is 1 where nothing but noise is left. The beginning of a lap that
+// follows something else than the others do (run_in()) is no repetition and tells no noise. A
+// disturbance that does not repeat (hum, vibration) belongs to that noise; it is seen as a line in
+// the periodogram of d_i, 40 times above the running median.
 //
 // Rounding by an encoder depends on where the axis is, so it repeats from lap to lap though nobody
 // can predict it: a sample of it is added, which counts double what laps do show of it.

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 #include <utility>
+
+#include "diagnosis/records/stretches.hpp"
 
 namespace vcnc {
 namespace {
@@ -64,6 +65,9 @@ Partition partition(const Record& record) {
     p.stretches = even_stretches(0, record.samples());
   else if (!p.repeated)
     p.stretches = even_stretches(p.stretches.front().begin, p.stretches.back().end);
+
+  for (const std::vector<Stretch>& laps : p.repetitions())
+    p.run_in[laps.front().condition] = run_in(record, laps);
 
   const auto second =
       static_cast<std::size_t>(std::max(1.0, std::round(1 / std::max(record.period, 1e-9))));

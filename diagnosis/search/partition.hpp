@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <vector>
 
 #include "diagnosis/records/record.hpp"
@@ -33,6 +34,8 @@ struct Partition {
   bool once(const Stretch& stretch) const;
   /// The laps of every condition that was run more than once, all as long as its shortest.
   std::vector<std::vector<Stretch>> repetitions() const;
+  /// Samples at the beginning of its laps that are no repetition, by condition (stretches.hpp).
+  std::map<int, std::size_t> run_in;
 };
 
 Partition partition(const Record& record);

@@ -40,56 +40,89 @@ class Search {
         std::accumulate(rules_.floor_of.begin(), rules_.floor_of.end(), 0.0);
     rules_.base_of = evidence_.chi2_of(result_.base.residual, Role::held_out);
     result_.base.rounding = evidence_.made_by_steps(result_.base.prediction);
-    trials_.simulate(needed());
+    if (going_) trials_.simulate(needed());
     result_.release_limits = release_limits(fitted);
-    result_.found = result_.base;
-    if (going_) {
-      Contest contest(rules_, result_.base);
-      const std::vector<Contender> contenders = contest.contenders();
-      result_.found = climbed(contenders, contest, result_.ladder);
-      for (const Contender& other : alternatives(contenders)) {
-        if (!going_ || result_.found.held_out < options_.model_form * result_.floor) break;
-        if (imitates(result_.found)) break;
-        std::vector<LadderStep> ladder;
-        FittedMachine found = climbed({other}, contest, ladder);
-        if (!going_ || found.held_out > result_.found.held_out - options_.least_gain) continue;
-        result_.found = std::move(found);
-        result_.ladder = std::move(ladder);
-      }
-      // Where nothing is found, it was a matter of tolerance after all.
-      if (result_.found.found() == 0) result_.found = result_.base = fitted;
-      evidence_.anchor(result_.found.machine);
-      if (result_.found.found() > 0)
+    best_.machine = result_.base;
+    if (going_) unless_stopped([this] { search(); });
+    for (FreedNumber& n : best_.machine.nuisances.numbers) n.held = false;
+    result_.found = best_.machine;
+    result_.ladder = best_.ladder;
+    // Where nothing is found, it was a matter of tolerance after all.
+    if (result_.found.found() == 0) result_.found = result_.base = fitted;
+    evidence_.anchor(result_.found.machine);
+    if (going_ && result_.found.found() > 0)
+      unless_stopped([this] {
         result_.beside_found = limits_beside(rules_, result_.base, result_.found, needed());
-    }
+      });
     result_.interrupted = !going_;
     return std::move(result_);
   }
 
  private:
+  /// What a search came to, and by which steps.
+  struct Climb {
+    FittedMachine machine;
+    std::vector<LadderStep> ladder;
+  };
+
   bool go(const std::string& doing, double share) {
     const std::lock_guard lock(guard_);
-    if (going_ && keep_going_ && !keep_going_({doing, share})) going_ = false;
+    now_ = {doing, share};
+    return asked();
+  }
+  /// The same in the midst of what is done.
+  bool goes_on() {
+    const std::lock_guard lock(guard_);
+    return asked();
+  }
+  bool asked() {
+    if (going_ && keep_going_ && !keep_going_(now_)) going_ = false;
     return going_;
   }
 
+  /// Does something that may be stopped at any prediction.
+  template <class F>
+  void unless_stopped(F&& f) {
+    evidence_.stop_when([this] { return !goes_on(); });
+    try {
+      f();
+    } catch (const Stopped&) {
+    }
+    evidence_.stop_when({});
+  }
+
+  /// What is found, as far as it is settled, stands in `best_`.
+  void search() {
+    Contest contest(rules_, result_.base);
+    const std::vector<Contender> contenders = contest.contenders();
+    climb(contenders, contest, best_);
+    for (const Contender& other : alternatives(contenders)) {
+      if (best_.machine.held_out < options_.model_form * result_.floor) break;
+      if (imitates(best_.machine)) break;
+      Climb instead{result_.base, {}};
+      climb({other}, contest, instead);
+      if (instead.machine.held_out > best_.machine.held_out - options_.least_gain) continue;
+      best_ = std::move(instead);
+    }
+  }
+
   /// The base machine with one of the contenders, and then one effect after the other until none
-  /// gains enough.
-  FittedMachine climbed(const std::vector<Contender>& contenders, const Contest& first,
-                        std::vector<LadderStep>& ladder) {
+  /// gains enough; `to` holds what was settled so far.
+  void climb(const std::vector<Contender>& contenders, const Contest& first, Climb& to) {
     FittedMachine now = result_.base;
     trials_.begin_again();
     evidence_.anchor(now.machine);
-    if (!accept_one(now, now, contenders, first)) return now;
+    if (!accept_one(now, now, contenders, first)) return;
     Found before;
-    while (going_) {
+    while (true) {
       now.rounding = rounding_of(now);
       trials_.look_again(now);
       exchange_.settle(now);
       for (std::size_t i = 0; i < now.added.size(); ++i)
         if (now.added[i].acts.empty()) changes_.weigh(now, i);  // one that took a place
       now.rounding = rounding_of(now);
-      ladder.push_back(step_of(now, ladder.size()));
+      to.ladder.push_back(step_of(now, to.ladder.size()));
+      to.machine = now;
       if (now.found() >= options_.max_effects) break;
       if (found_in(now) == before) break;
       before = found_in(now);
@@ -103,7 +136,7 @@ class Search {
       if (!accept_one(now, from, next, contest)) break;
     }
     hold_unlikely(now, first);
-    return now;
+    to.machine = std::move(now);
   }
 
   /// Declared numbers that are pulled to where they hardly are, for next to nothing, stay as
@@ -111,7 +144,7 @@ class Search {
   void hold_unlikely(FittedMachine& m, const Contest& contest) {
     FittedMachine held = changes_.within_tolerance(m, kUnlikely);
     const double nothing = contest.band_of(contest.held_out());  // as if nothing were left
-    if (going_ && held.found() > 0 && contest.counts(held) >= contest.counts(m) - nothing &&
+    if (held.found() > 0 && contest.counts(held) >= contest.counts(m) - nothing &&
         changes_.holds_up(held))
       m = std::move(held);
     for (FreedNumber& n : m.nuisances.numbers) n.held = false;
@@ -146,7 +179,7 @@ class Search {
   /// that explains most at first may be neither.
   std::vector<Contender> alternatives(const std::vector<Contender>& contenders) const {
     std::vector<Contender> all;
-    if (rules_.excess(result_.found.held_out) > kMostLeft * rules_.excess(result_.base.held_out))
+    if (rules_.excess(best_.machine.held_out) > kMostLeft * rules_.excess(result_.base.held_out))
       return all;
     for (std::size_t i = 1; i < contenders.size() && all.size() < kAlternatives; ++i)
       if (contenders[i].released.empty() && contenders[i].gain > kNearLoss * contenders[0].gain)
@@ -158,7 +191,7 @@ class Search {
   /// everything has been fitted together.
   bool accept_one(FittedMachine& now, const FittedMachine& from,
                   const std::vector<Contender>& contenders, const Contest& contest) {
-    for (std::size_t i = 0; i < std::min(kAttempts, contenders.size()) && going_; ++i) {
+    for (std::size_t i = 0; i < std::min(kAttempts, contenders.size()); ++i) {
       FittedMachine trial = changes_.fitted_with(
           from, contenders[i],
           i == 0 ? contest.equivalents(contenders) : std::vector<std::size_t>{});
@@ -268,17 +301,15 @@ class Search {
   const KeepGoing& keep_going_;
   SelectionResult result_;
   std::vector<FittedMachine> also_fitted_;  ///< with a contender that the last one was chosen over
+  Climb best_;
   std::mutex guard_;
+  DiagnosisProgress now_;
   bool going_ = true;
-  ContestRules rules_{evidence_,
-                      candidates_,
-                      options_,
-                      result_.trials,
-                      {},
-                      0,
-                      {},
-                      [this](const std::string& doing, double share) { return go(doing, share); },
-                      [this] { return going_; }};
+  ContestRules rules_{
+      evidence_, candidates_,
+      options_,  result_.trials,
+      {},        0,
+      {},        [this](const std::string& doing, double share) { return go(doing, share); }};
   MachineChanges changes_{evidence_, declared_, rules_, result_.base};
   Exchange exchange_{evidence_, rules_, changes_, result_.base, also_fitted_};
   TrialPool trials_{rules_, declared_, result_.base};

@@ -17,7 +17,6 @@ constexpr double kPartInALine = 0.25;  ///< of the least gain: less, and a wave 
 double TrialPool::worth_of_line() const { return kPartInALine * rules_.options.least_gain; }
 
 void TrialPool::simulate(const Needed& needed) {
-  if (!rules_.goes_on()) return;
   values_.emplace_back(rules_.evidence, declared_, base_.residual, worth_of_line());
   const std::vector<Trial> all = worth_trying(values_.front());
   const std::string doing =

@@ -73,8 +73,14 @@ TEST(ImportMap, RefusesWithLineKeyAndWhatIsAllowed) {
       {with("[[signals]]\ncolumn = \"v\"\nkind = \"velocity\"\naxis = \"X\"\n"),
        "signals.unit: is missing"},
       {with("[[signals]]\ncolumn = \"v\"\naxis = \"X\"\nunit = \"mm\"\n"),
-       "signals.kind: is missing; allowed command, position, motor_position, load_position, twist, "
-       "velocity, force, applied_force, added_force, deflection,"},
+       "signals.kind: is missing; allowed command, position, motor_position, load_position, "
+       "following_error, twist, velocity, force, applied_force, added_force, deflection,"},
+      {with("[[signals]]\ncolumn = \"e\"\nkind = \"following_error\"\naxis = \"Y\"\nunit = "
+            "\"um\"\n"),
+       "a following_error of Y says where it is beside its command, which is not given"},
+      {with("[[signals]]\ncolumn = \"e\"\nkind = \"following_error\"\naxis = \"X\"\nunit = \"um\"\n"
+            "[[signals]]\ncolumn = \"c\"\nkind = \"command\"\naxis = \"X\"\nunit = \"mm\"\n"),
+       "X has a position as well; one of the two is too many"},
       {with("[[signals]]\ncolumn = \"d\"\nkind = \"position\"\naxis = \"Q\"\nunit = \"mm\"\n"),
        "\"Q\" is no axis that has a position; allowed X, Y, Z, A, C, \"carriage\""},
       {with("[[signals]]\ncolumn = \"d\"\nkind = \"deflection\"\naxis = \"X\"\nunit = \"um\"\n"),

@@ -569,7 +569,7 @@ struct QuietContest {
     return record;
   }
   ContestRules rules(double floor, std::vector<double> floor_of) {
-    return {evidence, none, options, trials, {}, floor, std::move(floor_of), {}, {}};
+    return {evidence, none, options, trials, {}, floor, std::move(floor_of), {}};
   }
 };
 

@@ -140,6 +140,47 @@ TEST(ImportTable, UnitScaleSignAndOffsetComeOutInSi) {
   EXPECT_NEAR(record.find(SignalKind::force, 0)->value[500], LinearAxis::force(0.496), 1e-3);
 }
 
+TEST(ImportTable, AFollowingErrorIsAPositionBesideItsCommand) {
+  Columns all = columns();
+  all["behind"] = [](double t) {
+    return 1e6 * (LinearAxis::position(t) - LinearAxis::position(t - 0.004));
+  };
+  const auto map = [](const std::string& more) {
+    return kTime + signal("behind", "following_error", "X", "um", more) +
+           signal("cmd", "command", "X", "m");
+  };
+  const Record record = imported(map(""), table_of(all));
+  const MeasuredSignal* position = record.find(SignalKind::position, kX);
+  ASSERT_NE(position, nullptr);
+  EXPECT_NEAR(position->value[700], LinearAxis::position(0.696), 1e-6);
+  EXPECT_EQ(position->source, "cmd - behind");
+  EXPECT_FALSE(warned(record, "ahead")) << all_warnings(record);
+  EXPECT_TRUE(warned(imported(map("sign = -1"), table_of(all)),
+                     "X goes ahead of its command: a following error is command less position"));
+}
+
+/// An axis that was told to stand trembles in the last digits of its encoder: nothing is the matter
+/// with its columns.
+TEST(ImportTable, AnAxisThatStandsIsNotJudged) {
+  Columns all = columns();
+  all["cmd_y"] = [](double) { return 0.1; };
+  all["pos_y"] = [](double) { return 0.1; };
+  all["vel_y"] = [](double t) { return 1e-5 * std::sin(170 * t); };
+  all["force_y"] = [](double t) { return 0.5 * std::round(3 * std::sin(50 * t)); };
+  MeasuredTable table = table_of(all);
+  for (MeasuredColumn& c : table.columns)
+    if (c.name == "cmd_y")
+      std::fill(c.value.begin(), c.value.end(), 0.1);
+    else if (c.name == "pos_y")  // without the noise of other columns
+      for (std::size_t k = 0; k < c.value.size(); ++k)
+        c.value[k] = 0.1 + 1e-8 * std::round(2 * std::sin(0.3 * static_cast<double>(k)));
+  const Record record = imported(
+      sound_map() + signal("cmd_y", "command", "Y", "m") + signal("pos_y", "position", "Y", "m") +
+          signal("vel_y", "velocity", "Y", "m/s") + signal("force_y", "force", "Y", "N"),
+      table);
+  EXPECT_EQ(all_warnings(record), "");
+}
+
 TEST(ImportTable, TwoEncodersOfARobotJointBecomePositionAndTwist) {
   Columns all = columns();
   all["motor"] = [](double t) { return 5 * LinearAxis::position(t); };

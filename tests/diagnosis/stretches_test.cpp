@@ -88,6 +88,32 @@ TEST(Stretches, LapsThatAreNoWholeNumberOfSamplesAreFound) {
 }
 
 /// As around a cone without unwinding.
+/// Of laps in a row the first one follows something else than the others do; of laps from rest to
+/// rest none does.
+TEST(Stretches, TheFirstOfLapsInARowStillHoldsWhatCameBefore) {
+  const auto run_in_of_laps = [](const Record& record) {
+    std::vector<Stretch> laps;
+    for (const Stretch& s : stretches_of(record))
+      if (s.end - s.begin > 1000) laps.push_back(s);
+    EXPECT_GE(laps.size(), 2U);
+    return run_in(record, laps);
+  };
+  Motion2 in_a_row;
+  in_a_row.stand(0.5);
+  in_a_row.laps(0.02, 1.2, 3.02);
+  in_a_row.stand(0.5);
+  EXPECT_EQ(run_in_of_laps(in_a_row.record()), 300U);
+  Motion2 from_rest;
+  for (int i = 0; i < 3; ++i) {
+    from_rest.stand(0.5);
+    from_rest.line(0.03, 1.2);
+    from_rest.line(-0.03, 1.2);
+  }
+  from_rest.stand(0.5);
+  EXPECT_EQ(run_in_of_laps(from_rest.record()), 0U);
+  EXPECT_EQ(run_in(Record(), {{0, 100, 0, 0, ""}}), 0U);
+}
+
 TEST(Stretches, ARotaryAxisThatHasTurnedRoundHasComeBack) {
   for (const std::size_t turning : {std::size_t{kC}, std::size_t{kZ}}) {
     Motion2 m;
