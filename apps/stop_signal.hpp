@@ -6,8 +6,7 @@
 namespace vcnc {
 
 /// Where what was found until then is told.
-inline constexpr const char* kStopping =
-    "\nstopping at the end of this step, with what was found; again: at once\n";
+inline constexpr const char* kStopping = "\nstopping, with what was found; again: at once\n";
 /// Installs the handlers for SIGINT and SIGTERM; the second one ends the program. `says` is written
 /// to standard error at the first one; a literal.
 void catch_stop_signals(const char* says = "");

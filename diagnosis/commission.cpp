@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <mutex>
 #include <numeric>
 
 #include "diagnosis/diagnose.hpp"
@@ -176,6 +177,7 @@ class Commissioner {
         evidence_(of.record, of.replica, of.declared),
         controller_(of.record, of.replica.channels(), of.declared) {
     if (leaves_noise) evidence_.take_noise_from(*leaves_noise);
+    if (keep_going_) evidence_.stop_when([this] { return !keep_going_(now_); });
     const Machine begun = with_lags_of(of.record, of.declared);
     tell_lags(begun);
     machine_ = fit_declared(evidence_, begun);
@@ -208,8 +210,9 @@ class Commissioner {
   }
 
  private:
-  bool go(const std::string& doing, std::size_t done) const {
-    return !keep_going_ || keep_going_({doing, static_cast<double>(done) / (kAxisCount + 1)});
+  bool go(const std::string& doing, std::size_t done) {
+    now_ = {doing, static_cast<double>(done) / (kAxisCount + 1)};
+    return !keep_going_ || keep_going_(now_);
   }
 
   /// Candidates by the names of their effects, in this order.
@@ -435,6 +438,7 @@ class Commissioner {
   const DiagnosisCase& of_;
   const DiagnosisOptions& options_;
   const KeepGoing& keep_going_;
+  DiagnosisProgress now_{"fitting the declared machine", 0};
   std::vector<Candidate> candidates_;
   Evidence evidence_;
   ControllerCheck controller_;
@@ -442,6 +446,22 @@ class Commissioner {
   FittedMachine before_friction_;
   Commissioning result_;
 };
+
+/// Anew with other noise where it took something else for it.
+Commissioning commissioned(const DiagnosisCase& of, const DiagnosisOptions& options,
+                           const KeepGoing& keep_going) {
+  Commissioner first(of, options, keep_going, nullptr);
+  Commissioning result = first.run();
+  bool again = first.mistook_noise();
+  for (int round = 0; again && round < kNoiseRounds; ++round) {
+    of.replica.anchor(of.declared);
+    Commissioner next(of, options, keep_going, &result.machine);
+    Commissioning better = next.run();
+    again = next.mistook_noise();
+    result = std::move(better);
+  }
+  return result;
+}
 
 }  // namespace
 
@@ -453,22 +473,18 @@ Commissioning commission(const DiagnosisCase& of, const DiagnosisOptions& option
     throw MeasurementError(of.record.source +
                            ": no axis moves; a model can only be fitted to "
                            "motion");
+  std::mutex guard;
   bool stopped = false;
   const KeepGoing watched = [&](const DiagnosisProgress& progress) {
-    stopped = keep_going && !keep_going(progress);
+    const std::lock_guard lock(guard);
+    stopped = stopped || (keep_going && !keep_going(progress));
     return !stopped;
   };
-  Commissioner first(of, options, watched, nullptr);
-  Commissioning result = first.run();
-  bool again = first.mistook_noise();
-  for (int round = 0; again && !stopped && round < kNoiseRounds; ++round) {
-    of.replica.anchor(of.declared);
-    Commissioner next(of, options, watched, &result.machine);
-    Commissioning better = next.run();
-    again = next.mistook_noise();
-    if (!stopped) result = std::move(better);
+  try {
+    return commissioned(of, options, watched);
+  } catch (const Stopped&) {
+    return {};
   }
-  return result;
 }
 
 }  // namespace vcnc

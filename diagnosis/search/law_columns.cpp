@@ -15,7 +15,7 @@ using Series = std::vector<double>;
 constexpr std::size_t kHats = 10;
 constexpr double kPulse = 2e-3;           // half width of the pulse [s]
 constexpr std::size_t kInstants = 64;     // at which a jump is sought first
-constexpr std::size_t kNearInstants = 4;  // of these, the best, next to which it is sought
+constexpr std::size_t kNearInstants = 2;  // of these, the best, next to which it is sought
 constexpr double kLongestJump = 5e-3;     // [s]
 
 Law pulse(std::size_t axis, double at, double size) {

@@ -47,6 +47,8 @@ class Search {
     for (FreedNumber& n : best_.machine.nuisances.numbers) n.held = false;
     result_.found = best_.machine;
     result_.ladder = best_.ladder;
+    if (!going_ && result_.ladder.size() < result_.found.found())  // before it was settled
+      result_.ladder.push_back(step_of(result_.found, result_.ladder.size()));
     // Where nothing is found, it was a matter of tolerance after all.
     if (result_.found.found() == 0) result_.found = result_.base = fitted;
     evidence_.anchor(result_.found.machine);
@@ -115,6 +117,7 @@ class Search {
     if (!accept_one(now, now, contenders, first)) return;
     Found before;
     while (true) {
+      to.machine = now;
       now.rounding = rounding_of(now);
       trials_.look_again(now);
       exchange_.settle(now);

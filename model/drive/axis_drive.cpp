@@ -96,6 +96,7 @@ AxisDriveOf<Real>::AxisDriveOf(const AxisParams& declared, const AxisParams& act
     rubbing_.set(i, axis_chain<FrictionPort>(effects, axis, seed));
     displacing_.set(i, axis_chain<DisplacementPort>(effects, axis, seed));
   }
+  sum_up_constant_friction();
   TransmissionPort::Signal<double> transmission{.damping_ratio = 0.05};
   axis_chain<TransmissionPort>(effects, axis, seed).step(transmission, {});
   couple(transmission, actual.mechanics.load);
@@ -154,6 +155,7 @@ AxisDriveOf<Real>::AxisDriveOf(std::vector<AxisDriveOf<double>> drives)
     rubbing_.set(i, std::move(drive.rubbing_.chain(0)));
     displacing_.set(i, std::move(drive.displacing_.chain(0)));
   }
+  sum_up_constant_friction();
 }
 
 template <class Real>
@@ -467,24 +469,41 @@ void AxisDriveOf<Real>::move_plant() {
     move_rigid(force, load_force_);
 }
 
-/// Velocity after friction has acted for one plant step.
 template <class Real>
-Real AxisDriveOf<Real>::rub(Real v, Real v_free, Real mobility) {
-  const bool one_mass = motor_rubs_ && !two_masses_;
-  if (!rubbing_.some_active() && !one_mass) return v_free;
-  PerLane<Real, FrictionTerms> each{};
+FrictionPort::Signal<Real> as_one(const PerLane<Real, FrictionTerms>& each) {
+  return {packed(each, &FrictionTerms::dry), packed(each, &FrictionTerms::skew),
+          packed(each, &FrictionTerms::viscous), packed(each, &FrictionTerms::stiffness),
+          packed(each, &FrictionTerms::damping)};
+}
+
+template <class Real>
+void AxisDriveOf<Real>::sum_up_constant_friction() {
+  for (std::size_t i = 0; i < kLanesOf<Real>; ++i)
+    constant_of_each_[i] = rubbing_.chain(i).constant();
+  constant_ = as_one<Real>(constant_of_each_);
+}
+
+template <class Real>
+FrictionPort::Signal<Real> AxisDriveOf<Real>::friction_terms(Real v, Real v_free) {
+  if (!rubbing_.some_vary()) return constant_;
+  PerLane<Real, FrictionTerms> each = constant_of_each_;
   FrictionPort::Context<double> context{.moment =
                                             moment(kPlantTime, kPlantStepsPerLoop, plant_step_)};
   rubbing_.each_active([&](Chain<FrictionPort>& chain, std::size_t i) {
     context.position = lane(x_load_, i);
     context.velocity = lane(v, i);
     context.free_velocity = lane(v_free, i);
-    chain.step(each[i], context);
+    chain.vary(each[i], context);
   });
-  FrictionPort::Signal<Real> terms{
-      packed(each, &FrictionTerms::dry), packed(each, &FrictionTerms::skew),
-      packed(each, &FrictionTerms::viscous), packed(each, &FrictionTerms::stiffness),
-      packed(each, &FrictionTerms::damping)};
+  return as_one<Real>(each);
+}
+
+/// Velocity after friction has acted for one plant step.
+template <class Real>
+Real AxisDriveOf<Real>::rub(Real v, Real v_free, Real mobility) {
+  const bool one_mass = motor_rubs_ && !two_masses_;
+  if (!rubbing_.some_active() && !one_mass) return v_free;
+  FrictionPort::Signal<Real> terms = friction_terms(v, v_free);
   if (one_mass) terms.dry += motor_dry_, terms.viscous += motor_viscous_;
   return friction_.step(terms, v, v_free, kPlantTime, mobility);
 }

@@ -134,10 +134,13 @@ class ChainsOf {
   void set(std::size_t lane, Chain<Port> chain) {
     some_active_ = some_active_ || !chain.empty();
     remembers_[lane] = chain.remembers();
+    some_vary_ = some_vary_ || chain.varies();
     chains_[lane] = std::move(chain);
   }
   Chain<Port>& chain(std::size_t lane) { return chains_[lane]; }
   bool some_active() const { return some_active_; }
+  /// Whether some do more than to add constants.
+  bool some_vary() const { return some_vary_; }
   /// Whether its effects depend on what was before.
   bool remembers(std::size_t lane) const { return remembers_[lane]; }
   /// Calls f(chain, lane) for those that have effects.
@@ -151,7 +154,7 @@ class ChainsOf {
  private:
   PerLane<Real, Chain<Port>> chains_;
   PerLane<Real, bool> remembers_{};
-  bool some_active_ = false;
+  bool some_active_ = false, some_vary_ = false;
 };
 
 /// Real: double, or Lanes for several axes at a time.
@@ -256,6 +259,8 @@ class AxisDriveOf {
   void move_rigid(Real force, Real load_force);
   void move_two_masses(Real force, Real load_force);
   Real rub(Real v, Real v_free, Real mobility);
+  FrictionPort::Signal<Real> friction_terms(Real v, Real v_free);
+  void sum_up_constant_friction();
   Real rub_motor(Real v_free);
   Real displaced(Real velocity_before);
   /// How far the load is ahead of the motor by an uneven transmission, and what force the motor's
@@ -295,6 +300,8 @@ class AxisDriveOf {
   Chains<MotorForcePort> motor_;
   Chains<LoadForcePort> load_;
   Chains<FrictionPort> rubbing_;
+  PerLane<Real, FrictionTerms> constant_of_each_{};  ///< friction
+  FrictionPort::Signal<Real> constant_;              ///< the same
   Chains<DisplacementPort> displacing_;
   bool laws_;          ///< some law needs motions_
   bool told_ = false;  ///< tell_commands() was called

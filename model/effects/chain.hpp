@@ -1,7 +1,9 @@
 // The active effects of a machine at one port, in the order of the list.
 //
 // A chain is built once; null effects are left out of it, so an ideal machine pays nothing. Then
-// step() runs every effect on the signal: no allocation, no branch on what is active.
+// step() runs every effect on the signal: no allocation, no branch on what is active. Effects that
+// add the same at all times (`constant`) are summed up beforehand; what multiplies their terms
+// comes after them in the list.
 #pragma once
 
 #include <memory>
@@ -47,7 +49,12 @@ class Chain {
   using Signal = typename Port::template Signal<double>;
   using Context = typename Port::template Context<double>;
 
-  bool empty() const { return stages_.empty(); }
+  bool empty() const { return stages_.empty() && !some_constant_; }
+
+  /// What constant effects add; nothing at a port that has none.
+  const Signal& constant() const { return constant_; }
+  /// Whether others do something.
+  bool varies() const { return !stages_.empty(); }
 
   /// Whether some effect depends on what was before.
   bool remembers() const {
@@ -57,12 +64,23 @@ class Chain {
   }
 
   void step(Signal& signal, const Context& context) {
+    if constexpr (requires { signal += signal; }) signal += constant_;
+    vary(signal, context);
+  }
+  /// All but the constant ones.
+  void vary(Signal& signal, const Context& context) {
     for (const auto& stage : stages_) stage->step(signal, context);
   }
 
   template <class Effect>
   void add(const Effect& effect, const Seat& seat) {
-    stages_.push_back(std::make_unique<EffectStage<Effect>>(effect, seat));
+    if constexpr (requires { Effect::constant; }) {
+      NoState none;
+      step_effect<double>(effect, constant_, Context{}, none, seat);
+      some_constant_ = true;
+    } else {
+      stages_.push_back(std::make_unique<EffectStage<Effect>>(effect, seat));
+    }
   }
   /// A law; what y does at this port is law_step(port, signal, context, axis, y).
   void add(const Law& law) { stages_.push_back(std::make_unique<LawStage>(law)); }
@@ -93,6 +111,8 @@ class Chain {
     Law law;
   };
 
+  Signal constant_{};
+  bool some_constant_ = false;
   std::vector<std::unique_ptr<Stage>> stages_;
 };
 

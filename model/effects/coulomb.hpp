@@ -9,6 +9,7 @@ namespace vcnc {
 struct Coulomb {
   using Port = FrictionPort;
   static constexpr Place place = Place::axis;
+  static constexpr bool constant = true;
   static constexpr EffectText text{
       .name = "coulomb",
       .title = "Coulomb friction",

@@ -196,6 +196,12 @@ struct FrictionPort {
     T viscous{};    ///< [N s/m]
     T stiffness{};  ///< of the bristles, sigma0 [N/m]; 0: sticks without sliding
     T damping{};    ///< of the bristles, sigma1 [N s/m]
+
+    Signal& operator+=(const Signal& s) {
+      dry += s.dry, skew += s.skew, viscous += s.viscous;
+      stiffness += s.stiffness, damping += s.damping;
+      return *this;
+    }
   };
   template <class T>
   struct Context {

@@ -9,6 +9,7 @@ namespace vcnc {
 struct Presliding {
   using Port = FrictionPort;
   static constexpr Place place = Place::axis;
+  static constexpr bool constant = true;
   static constexpr EffectText text{
       .name = "presliding",
       .title = "Pre-sliding (LuGre bristles)",

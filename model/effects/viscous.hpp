@@ -9,6 +9,7 @@ namespace vcnc {
 struct Viscous {
   using Port = FrictionPort;
   static constexpr Place place = Place::axis;
+  static constexpr bool constant = true;
   static constexpr EffectText text{
       .name = "viscous",
       .title = "Viscous friction",

@@ -11,8 +11,11 @@
 namespace vcnc::commission_test {
 namespace {
 
-Commissioning commissioned_x(const Effects& effects) {
-  const RunOfMachine run = reversals_in_the_air(effects);
+/// `declared`: an effect of X that the file has, too.
+template <class... Declared>
+Commissioning commissioned_x(const Effects& effects, const Declared&... declared) {
+  RunOfMachine run = reversals_in_the_air(effects);
+  ((run.declared.effects.axis[kX].get<Declared>() = declared), ...);
   MachineReplica replica(run.record, run.declared, run.piece);
   std::vector<Candidate> all = candidates(run.declared);
   std::erase_if(all, [](const Candidate& c) { return c.place != "X"; });
@@ -40,6 +43,32 @@ TEST(Commission, RecoversFrictionAndGainOfTheVirtualMachine) {
     if (f.channel.kind == SignalKind::position && f.channel.axis == kX) {
       EXPECT_LT(f.after, 0.01 * f.before);
     }
+}
+
+/// Of an axis whose compliance is declared and of which both sides are measured: what of its
+/// friction is before the compliance twists nothing.
+TEST(Commission, TellsFrictionOfTheMotorFromThatOfTheLoad) {
+  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
+  Effects effects;
+  Windup& windup = effects.axis[kX].get<Windup>();
+  windup = Windup::nominal(false);
+  effects.axis[kX].get<Coulomb>().level = 180;
+  effects.axis[kX].get<MotorFriction>().level = 120;
+  const Commissioning c = commissioned_x(effects, windup);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.coulomb.level_N"), 180, 0.05 * 180);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.motor_friction.level_N"), 120, 0.05 * 120);
+}
+
+TEST(Commission, StopsInTheMidstOfAFit) {
+  Effects effects;
+  effects.axis[kX].get<Coulomb>().level = 180;
+  const RunOfMachine run = reversals_in_the_air(effects);
+  MachineReplica replica(run.record, run.declared, run.piece);
+  int asked = 0;
+  const Commissioning c = commission({run.record, replica, run.declared, candidates(run.declared)},
+                                     {}, [&](const DiagnosisProgress&) { return ++asked < 5; });
+  EXPECT_EQ(asked, 5);
+  EXPECT_TRUE(c.numbers.empty());
 }
 
 /// Declared without friction, and without the filter of the measured velocity.

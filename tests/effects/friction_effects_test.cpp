@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "model/effects/chain.hpp"
 #include "tests/effects/axis_bench.hpp"
@@ -211,6 +212,36 @@ TEST(FrictionEffects, FadeFallsExponentially) {
   EXPECT_NEAR(axis.go(0.25).force, 202.5909580878582, 0.01);
   EXPECT_NEAR(axis.go(1.5).force, 176.3736729166551, 0.01);
   EXPECT_NEAR(axis.at_speed(-0.01, 20).force, -175, kLevel);
+}
+
+// What constant effects add is summed up beforehand: to the bit what all effects make one after the
+// other, as the library lists them.
+TEST(FrictionEffects, ConstantOnesMaySumUpBeforehand) {
+  Machine machine;
+  for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
+    if constexpr (std::is_same_v<typename Effect::Port, FrictionPort>)
+      machine.effects.axis[kX].get<Effect>() = Effect::nominal(false);
+  });
+  auto chain = axis_chain<FrictionPort>(machine.effects, kX, 1);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> number(-0.1, 0.1);
+  for (int i = 0; i < 2000; ++i) {
+    const double q = number(random), v = std::pow(number(random), 3);
+    const FrictionPort::Context<double> context{{.t = 1e-3 * i}, q, v, v + 1e-4 * number(random)};
+    FrictionTerms one_by_one, at_once;
+    for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
+      if constexpr (std::is_same_v<typename Effect::Port, FrictionPort>) {
+        NoState none;
+        step_effect<double>(machine.effects.axis[kX].get<Effect>(), one_by_one, context, none,
+                            Seat{kX, false, NoiseStream(1, Effect::text.name, kX)});
+      }
+    });
+    chain.step(at_once, context);
+    for (double FrictionTerms::*term :
+         {&FrictionTerms::dry, &FrictionTerms::skew, &FrictionTerms::viscous,
+          &FrictionTerms::stiffness, &FrictionTerms::damping})
+      ASSERT_EQ(at_once.*term, one_by_one.*term) << i;
+  }
 }
 
 // At the ends of their ranges what changes friction takes it away, but never makes it drive.
