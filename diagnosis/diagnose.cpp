@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <mutex>
 #include <optional>
 
 #include "diagnosis/findings.hpp"
@@ -196,14 +197,19 @@ Diagnosis findings_of_search(const DiagnosisCase& of, Attempt& search, bool diff
                        differential);
   };
   if (search.selection.interrupted || !keep_going) return findings();
-  search.evidence.stop_when([&] { return !keep_going({"telling what was found", 1}); });
+  std::mutex guard;
+  search.evidence.stop_when([&] {
+    const std::lock_guard lock(guard);
+    return !keep_going({"telling what was found", 1});
+  });
+  std::optional<Diagnosis> told;
   try {
-    return findings();
+    told = findings();
   } catch (const Stopped&) {
     search.selection.interrupted = true;
-    search.evidence.stop_when({});
-    return findings();
   }
+  search.evidence.stop_when({});
+  return told ? std::move(*told) : findings();
 }
 
 /// The record of the case is what is explained: what was measured, or `difference`.
