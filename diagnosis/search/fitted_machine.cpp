@@ -119,7 +119,8 @@ bool step_towards(const Evidence& evidence, FittedMachine& m, const Refit& f,
   return false;
 }
 
-/// Whether two refits of the same machine go to the same place, but for a twentieth of the way.
+/// Whether two refits of the same machine go to the same place: linear numbers but for a twentieth
+/// of their way, live ones, which damping hardly moves, but for a twentieth of themselves.
 bool leads_the_same_way(const Refit& a, const Refit& b) {
   constexpr double kOfTheWay = 0.05;
   const auto apart = [](double x, double y) {

@@ -469,12 +469,16 @@ void AxisDriveOf<Real>::move_plant() {
     move_rigid(force, load_force_);
 }
 
+namespace {
+
 template <class Real>
 FrictionPort::Signal<Real> as_one(const PerLane<Real, FrictionTerms>& each) {
   return {packed(each, &FrictionTerms::dry), packed(each, &FrictionTerms::skew),
           packed(each, &FrictionTerms::viscous), packed(each, &FrictionTerms::stiffness),
           packed(each, &FrictionTerms::damping)};
 }
+
+}  // namespace
 
 template <class Real>
 void AxisDriveOf<Real>::sum_up_constant_friction() {
