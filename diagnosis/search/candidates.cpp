@@ -116,15 +116,20 @@ Range range_with_a_motor_side(const Machine& declared, const std::string& key, R
 namespace {
 
 /// A zone lies within the travel of its axis and takes half of it at most: a wider one is friction
-/// as such.
-void keep_within_travel(const Machine& declared, Candidate& zone) {
+/// as such. A spring rests half a travel beyond it at most: else it is a weight.
+void keep_within_travel(const Machine& declared, Candidate& of_axis) {
   const auto axis = static_cast<std::size_t>(
-      std::find(kAxisNames.begin(), kAxisNames.end(), zone.place) - kAxisNames.begin());
+      std::find(kAxisNames.begin(), kAxisNames.end(), of_axis.place) - kAxisNames.begin());
   const double unit = is_rotary(axis) ? unit::deg.to_si : unit::mm.to_si;
   const double low = declared.axes[axis].limits.min / unit,
                high = declared.axes[axis].limits.max / unit;
-  for (FreeNumber& n : zone.numbers) {
+  for (FreeNumber& n : of_axis.numbers) {
     if (n.key.find(".centre_") != std::string::npos) n.min = low, n.max = high;
+    if (n.key.find(".rest_") != std::string::npos) {
+      const double travel = high - low;
+      n.min = low - travel / 2, n.max = high + travel / 2;
+      n.typical = travel / 10;
+    }
     if (n.key.find(".width_") != std::string::npos || n.key.find(".edge_") != std::string::npos)
       n.max = std::min(n.max, (high - low) / 2);
   }
@@ -159,7 +164,8 @@ std::vector<Candidate> candidates(const Machine& declared) {
       if (can_be<Effect>(place, declared)) add_candidate<Effect>(place, all);
   });
   for (Candidate& c : all)
-    if (c.effect == FrictionZone::text.name) keep_within_travel(declared, c);
+    if (c.effect == FrictionZone::text.name || c.effect == CableChain::text.name)
+      keep_within_travel(declared, c);
   add_deviations(declared, all);
   return all;
 }

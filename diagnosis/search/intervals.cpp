@@ -30,18 +30,13 @@ bool is_none_of_its_shape(const FreedNumber& number) {
   return number.shape && number.value == 0 && number.number.min == 0;
 }
 
-/// Where something is, not how large.
-bool is_place(const FreedNumber& number) {
-  return number.shape && number.number.key.find(".centre_") != std::string::npos;
-}
-
 /// The largest amplitude of the effect of a number that has its unit: what a law gets wrong about
 /// one of them shows in the others. In the unit of the key; of a phase a radian, as what is as
 /// large as a share of the wave and not in phase with it turns it by that share of one. Where a
 /// scale ends is read off and hangs on the form of no law, and where on an axis something is hangs
 /// on nothing that its coordinate is large by.
 double size_of(const FittedMachine& machine, const FreedNumber& number) {
-  if (is_limit(number.number) || is_place(number)) return 0;
+  if (is_limit(number.number) || is_place(number.number)) return 0;
   if (is_phase(number.number)) return 1 / si_of_unit(number.number.key);
   double largest = std::abs(number.value);
   for (const AddedEffect& a : machine.added) {

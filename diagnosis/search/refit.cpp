@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "diagnosis/search/parallel.hpp"
+#include "diagnosis/search/trial.hpp"
 
 namespace vcnc {
 namespace {
@@ -248,9 +249,10 @@ std::vector<Column> columns_of(const Evidence& evidence, const Machine& machine,
     std::vector<double> steps;
     for (std::size_t i = first; i < last; ++i) {
       const FreedNumber& n = numbers[i];
-      double step = n.shape ? 1e-4 * std::max(std::abs(n.value), 1e-3 * n.number.typical)
-                            : std::clamp(0.1 * std::abs(n.value), 0.01 * n.number.typical,
-                                         0.1 * n.number.typical);
+      double step = is_place(n.number) ? 1e-3 * n.number.typical
+                    : n.shape          ? 1e-4 * std::max(std::abs(n.value), 1e-3 * n.number.typical)
+                              : std::clamp(0.1 * std::abs(n.value), 0.01 * n.number.typical,
+                                           0.1 * n.number.typical);
       if (n.value + step > n.number.max) step = -step;
       changed.push_back(machine);
       move_number(changed.back(), n.number.key, n.value + step);

@@ -35,13 +35,17 @@ double periods_per_turn(const Candidate& c, const Trial& trial) {
 
 bool is_fixed(const FreeNumber& n) {
   if (n.whole) return true;
-  for (const char* part : {".reference_", ".rest_", ".expansion_", ".channel"})
+  for (const char* part : {".reference_", ".expansion_", ".channel"})
     if (has_part(n.key, part)) return true;
   return false;
 }
 
 bool is_phase(const FreeNumber& n) {
   return has_part(n.key, ".phase_") || has_part(n.key, ".weight_imbalance.angle_");
+}
+
+bool is_place(const FreeNumber& n) {
+  return has_part(n.key, ".centre_") || has_part(n.key, ".rest_");
 }
 
 bool has_no_phase(const FreeNumber& n) { return has_part(n.key, "_bow_"); }
@@ -161,7 +165,8 @@ std::vector<FreedNumber> start_of(const Candidate& candidate, const Trial& trial
     FreedNumber freed{.number = n, .value = std::clamp(values[i], n.min, n.max), .centre = 0};
     freed.number.typical = std::abs(n.typical) > 0 ? std::abs(n.typical) : 1;
     if (is_phase(n)) freed.number.typical = 57.3;
-    if (shape && !is_phase(n)) freed.number.typical = std::max(std::abs(values[i]), 1e-6);
+    if (shape && !is_phase(n) && !is_place(n))
+      freed.number.typical = std::max(std::abs(values[i]), 1e-6);
     freed.shape = (shape && !is_phase(n)) || is_limit(n);
     numbers.push_back(freed);
   }

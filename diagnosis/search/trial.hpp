@@ -41,6 +41,8 @@ using TrialValues = std::function<std::vector<double>(const Candidate&, std::siz
 /// A number that only shifts what others do (a reference position): never fitted.
 bool is_fixed(const FreeNumber& number);
 bool is_phase(const FreeNumber& number);
+/// Where on the travel of an axis something is.
+bool is_place(const FreeNumber& number);
 /// An amplitude that stands beside a wave and has no phase.
 bool has_no_phase(const FreeNumber& number);
 /// An amplitude whose null value is no limit at all: it does more the smaller it is.

@@ -291,12 +291,14 @@ std::vector<double> TrialValuesOf::operator()(const Candidate& candidate,
     for (double waves = 0.5; waves <= 5; waves += 0.25) more({duration_ / waves});
   } else if (axis < kAxisCount && is_wavelength(n)) {
     for (const double w : wavelengths_[axis]) more({w / si_of_unit(n.key)});
-  } else if (axis < kAxisCount && contains(n.key, ".centre_")) {
+  } else if (axis < kAxisCount && is_place(n)) {
     const MeasuredSignal* command = evidence_->record().find(SignalKind::command, axis);
     if (!command) return values;
     const auto [low, high] = std::minmax_element(command->value.begin(), command->value.end());
     values.clear();
-    for (int i = 0; i < 8; ++i) more({(*low + (*high - *low) * (i + 0.5) / 8) / si_of_unit(n.key)});
+    const int places = contains(n.key, ".rest_") ? 3 : 8;  // a spring is nowhere without force
+    for (int i = 0; i < places; ++i)
+      more({(*low + (*high - *low) * (i + 0.5) / places) / si_of_unit(n.key)});
   } else if (contains(n.key, ".start_s")) {
     values = {jump_};
   } else if (contains(n.key, ".exponent")) {

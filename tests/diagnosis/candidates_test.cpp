@@ -105,23 +105,37 @@ TEST(Candidates, SidesAreThoseOfTheNullValue) {
   }
 }
 
-TEST(Candidates, AZoneOfFrictionLiesWithinTheTravel) {
+/// Of X, which goes from -100 to 300 mm.
+Candidate of_x(const std::string& effect) {
   Machine machine;
   machine.axes[0].limits.min = -0.1;
   machine.axes[0].limits.max = 0.3;
-  for (const Candidate& c : candidates(machine)) {
-    if (c.name() != "X.friction_zone") continue;
-    for (const FreeNumber& n : c.numbers) {
-      if (n.key.ends_with("centre_mm")) {
-        EXPECT_NEAR(n.min, -100, 1e-9);
-        EXPECT_NEAR(n.max, 300, 1e-9);
-      } else if (n.key.ends_with("width_mm") || n.key.ends_with("edge_mm")) {
-        EXPECT_NEAR(n.max, 200, 1e-9);
-      }
+  for (const Candidate& c : candidates(machine))
+    if (c.name() == "X." + effect) return c;
+  ADD_FAILURE() << "no such candidate";
+  return {};
+}
+
+TEST(Candidates, ASpringRestsHalfATravelBeyondItAtMost) {
+  const Candidate c = of_x("cable_chain");
+  ASSERT_EQ(c.numbers.size(), 3U);
+  const FreeNumber& rest = c.numbers.back();
+  EXPECT_EQ(rest.key, "effects.X.cable_chain.rest_mm");
+  EXPECT_NEAR(rest.min, -300, 1e-9);
+  EXPECT_NEAR(rest.max, 500, 1e-9);
+}
+
+TEST(Candidates, AZoneOfFrictionLiesWithinTheTravel) {
+  const Candidate c = of_x("friction_zone");
+  ASSERT_FALSE(c.numbers.empty());
+  for (const FreeNumber& n : c.numbers) {
+    if (n.key.ends_with("centre_mm")) {
+      EXPECT_NEAR(n.min, -100, 1e-9);
+      EXPECT_NEAR(n.max, 300, 1e-9);
+    } else if (n.key.ends_with("width_mm") || n.key.ends_with("edge_mm")) {
+      EXPECT_NEAR(n.max, 200, 1e-9);
     }
-    return;
   }
-  FAIL() << "no such candidate";
 }
 
 /// Of one mass friction has one side.

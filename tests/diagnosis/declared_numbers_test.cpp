@@ -17,8 +17,8 @@ namespace {
 using stroke_run::declared;
 using stroke_run::recorded;
 
-/// What changed between a healthy run and one of `now`, of servo loops, friction and what a wave or
-/// a spring on X does.
+/// What changed between a healthy run and one of `now`, of servo loops, friction and what a wave,
+/// a spring or a weight on X does.
 Diagnosis change(const Machine& now) {
   const Record reference = recorded(declared(), 16), record = recorded(now, 17);
   MachineReplica of_reference(reference, declared(), std::nullopt),
@@ -28,12 +28,14 @@ Diagnosis change(const Machine& now) {
   replica.apply(difference.unknown);
   std::vector<Candidate> all = candidates(declared());
   std::erase_if(all, [](const Candidate& c) {
-    static constexpr std::array<std::string_view, 7> tried{"kv_error",
+    static constexpr std::array<std::string_view, 9> tried{"kv_error",
                                                            "velocity_gain_error",
                                                            "integral_time_error",
                                                            "torque_constant_error",
                                                            "load_encoder_error",
                                                            "cable_chain",
+                                                           "weight_imbalance",
+                                                           "friction_asymmetry",
                                                            "viscous"};
     return c.place != "X" || std::find(tried.begin(), tried.end(), c.effect) == tried.end();
   });
@@ -61,6 +63,20 @@ TEST(DeclaredNumbers, SeveralDoNotStandForATorqueConstant) {
   ASSERT_EQ(d.effects.size(), 1U);
   EXPECT_EQ(d.effects[0].name, "torque_constant_error");
   EXPECT_NEAR(number_of(d.found, "effects.X.torque_constant_error.deviation_percent"), -6, 1);
+}
+
+// About where the machine counts nought it would be a spring and a weight.
+TEST(DeclaredNumbers, ASpringIsToldWithWhereItRests) {
+  Machine now = declared();
+  auto& chain = now.effects.axis[kX].get<CableChain>();
+  chain.stiffness = 1000;
+  chain.rest = 0.12;
+  const Diagnosis d = change(now);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::explained);
+  ASSERT_EQ(d.effects.size(), 1U);
+  EXPECT_EQ(d.effects[0].name, "cable_chain");
+  EXPECT_NEAR(number_of(d.found, "effects.X.cable_chain.stiffness_N_per_mm"), 1, 0.05);
+  EXPECT_NEAR(number_of(d.found, "effects.X.cable_chain.rest_mm"), 120, 1);
 }
 
 }  // namespace
