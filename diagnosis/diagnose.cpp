@@ -73,13 +73,14 @@ std::vector<double> left_by_commissioning(const Machine& declared,
   for (const CommissionedSignal& s : declared.commissioned) {
     bool known = false;
     for (const SignalKind kind :
-         {SignalKind::position, SignalKind::twist, SignalKind::force, SignalKind::deflection,
-          SignalKind::bar, SignalKind::tool_position})
+         {SignalKind::position, SignalKind::twist, SignalKind::velocity, SignalKind::force,
+          SignalKind::deflection, SignalKind::bar, SignalKind::tool_position})
       for (std::size_t axis = 0; axis < kAxisCount; ++axis)
         known = known || s.signal == signal_name(kind, axis);
     if (!known)
       throw InputError("commissioned.signal: \"" + s.signal +
-                       "\" is none; allowed: position, twist or force of X, Y, Z, A or C, "
+                       "\" is none; allowed: position, twist, velocity or force of X, Y, Z, A or "
+                       "C, "
                        "deflection or tool position of x, y or z, ball bar");
     for (std::size_t c = 0; c < channels.size(); ++c)
       if (channel_name(channels[c]) == s.signal) left[c] = s.left;

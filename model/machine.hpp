@@ -373,7 +373,8 @@ struct CommissionedSignal {
   static void fields(Self& p, Visit& visit) {
     visit("signal", p.signal, "position X, twist X, force X, deflection x, ...");
     visit("left_si", p.left, Unit{"", 1}, Range{0, 1e6},
-          "RMS that the model leaves of it in a healthy run, noise aside, in m, rad, N or Nm");
+          "RMS that the model leaves of it in a healthy run, noise aside, in m, rad, m/s, rad/s, N "
+          "or Nm");
   }
 };
 

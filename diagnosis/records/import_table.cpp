@@ -86,7 +86,7 @@ class Importer {
       add_bar_on_arcs(by_map_, *columns_.front(), base_, record_);
     for (MeasuredSignal& error : following_errors_) add_position(std::move(error));
     add_twists();
-    check_record(record_, velocities_, declared_);
+    check_record(record_, declared_);
     cut();
     return std::move(record_);
   }
@@ -197,8 +197,8 @@ class Importer {
         signal.kind = SignalKind::twist;
         break;
       case Kind::velocity:
-        velocities_.push_back(std::move(signal));
-        return;
+        signal.kind = SignalKind::velocity;
+        break;
       case Kind::force:
         signal.kind = SignalKind::force;
         break;
@@ -410,7 +410,6 @@ class Importer {
   std::vector<const MeasuredColumn*> columns_;  // of each signal of the map
   std::size_t rows_ = 0, temperatures_ = 0;
   std::map<std::size_t, std::map<Kind, std::size_t>> positions_;  // axis: kind: signal
-  std::vector<MeasuredSignal> velocities_;                        // for checks only
   std::vector<MeasuredSignal> following_errors_;
   TimeBase base_;
   Record record_;

@@ -25,6 +25,7 @@ enum class SignalKind {
   command,        ///< position the axis was told to have [m or rad]
   position,       ///< position by the measuring system the loop is closed with [m or rad]
   twist,          ///< load side minus motor side [m or rad]
+  velocity,       ///< of the motor side [m/s or rad/s]
   force,          ///< force of the drive on the load side [N or N m]
   applied_force,  ///< known force on the load beside that of its drive [N or N m]
   added_force,    ///< known part of the drive's force that its loops did not ask for [N or N m]
@@ -43,8 +44,8 @@ constexpr bool is_reading(SignalKind q) {
 }
 
 constexpr bool is_compared(SignalKind q) {
-  return q == SignalKind::position || q == SignalKind::twist || q == SignalKind::force ||
-         is_reading(q);
+  return q == SignalKind::position || q == SignalKind::twist || q == SignalKind::velocity ||
+         q == SignalKind::force || is_reading(q);
 }
 
 /// What is on the table in place of a piece that a probe touches: one ball of a bar whose other one

@@ -11,6 +11,7 @@
 
 #include "diagnosis/records/commanded_motion.hpp"
 #include "diagnosis/records/frozen_check.hpp"
+#include "diagnosis/records/late_velocity.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/records/position_jumps.hpp"
 #include "diagnosis/records/signal_name.hpp"
@@ -35,6 +36,7 @@ constexpr double kFits = 0.95;              ///< ... of what certainly does
 constexpr double kSlope = 0.1;              ///< how far a slope may be off 1
 constexpr double kLead = 2e-3;              ///< [s] that no feed-forward makes by itself
 constexpr double kLate = 0.2e-3;            ///< [s] that no viscous drag twists a transmission by
+constexpr double kLateVelocity = 0.5e-3;    ///< [s] that a filter makes
 constexpr double kViscous = 0.1;            ///< share of a sine that nothing but the velocity makes
 constexpr std::size_t kEnoughToTell = 200;  // values, whether one of them stands alone
 constexpr std::size_t kOneIn = 1000;        // such bends are usual
@@ -118,14 +120,15 @@ bool fits(const Relation& r) {
 
 class Checker {
  public:
-  Checker(Record& record, const std::vector<MeasuredSignal>& velocities, const Machine* declared)
-      : record_(record), velocities_(velocities), declared_(declared), half_(half_width(record)) {}
+  Checker(Record& record, const Machine* declared)
+      : record_(record), declared_(declared), half_(half_width(record)) {}
 
   void run() {
     take_out_frozen(record_);
     check_values();
     check_poses();
-    for (const MeasuredSignal& v : velocities_) check_velocity(v);
+    for (const MeasuredSignal& s : record_.signals)
+      if (s.kind == SignalKind::velocity) check_velocity(s);
     for (const MeasuredSignal& s : record_.signals) {
       if (s.kind == SignalKind::position)
         check_command(s), check_twist(s), check_sides(s), check_late(s);
@@ -159,10 +162,6 @@ class Checker {
   }
   static std::string name(const MeasuredSignal& s) {
     return fmt::format("\"{}\" ({})", s.source, signal_name(s.kind, s.axis));
-  }
-
-  static std::string speed_name(const MeasuredSignal& s) {
-    return fmt::format("\"{}\" (velocity {})", s.source, kAxisNames[s.axis]);
   }
 
   /// Smoothed velocity of a position.
@@ -310,20 +309,18 @@ class Checker {
   void check_velocity(const MeasuredSignal& s) {
     const MeasuredSignal* own = motion(s.axis);
     if (stands(s.axis)) return;
-    if (constant(s.value)) warn(speed_name(s) + " is constant");
     if (!own || constant(own->value) || constant(s.value)) return;
     const Series measured = smoothed(s.value, half_);
     const Relation r = relate(speed_of(*own), measured);
     if (!r.known) return;
     const bool belongs = std::abs(r.correlation) >= kBelongs;
-    if (belongs && std::abs(r.slope - 1) <= kSlope) return;
+    if (belongs && std::abs(r.slope - 1) <= kSlope) return check_late_velocity(s);
     if (fits(relate(speed_of(s), smoothed(own->value, half_))))
-      refuse(fmt::format("{} is the derivative of {}: the columns are swapped", name(*own),
-                         speed_name(s)));
+      refuse(
+          fmt::format("{} is the derivative of {}: the columns are swapped", name(*own), name(s)));
     if (belongs) {
-      const std::string found =
-          fmt::format("{} is {:.4g} times the derivative of {}{}", speed_name(s), r.slope,
-                      name(*own), usual_mistake(r.slope));
+      const std::string found = fmt::format("{} is {:.4g} times the derivative of {}{}", name(s),
+                                            r.slope, name(*own), usual_mistake(r.slope));
       if (!(r.slope > 0.75 && r.slope < 1.33))
         refuse(found + "; check unit, scale and sign of the two columns");
       warn(found);
@@ -333,12 +330,20 @@ class Checker {
       const MeasuredSignal* o = motion(other);
       if (o && other != s.axis && !constant(o->value) && fits(relate(speed_of(*o), measured)))
         refuse(fmt::format("{} is the derivative of {}, not of {}: the columns are swapped",
-                           speed_name(s), name(*o), name(*own)));
+                           name(s), name(*o), name(*own)));
     }
     refuse(
         fmt::format("{} is not the derivative of {} (correlation {:.2f}); one of the columns is "
                     "another signal",
-                    speed_name(s), name(*own), r.correlation));
+                    name(s), name(*own), r.correlation));
+  }
+
+  void check_late_velocity(const MeasuredSignal& s) {
+    const auto late = lateness_of_velocity(record_, s.axis);
+    if (!late || std::abs(*late) < kLateVelocity) return;
+    warn(fmt::format("{} comes {:.3g} ms {} the position of {}; it is compared as if it did not",
+                     name(s), 1e3 * std::abs(*late), *late > 0 ? "after" : "before",
+                     kAxisNames[s.axis]));
   }
 
   /// Motor and load move alike, but for what twists and plays between them.
@@ -688,7 +693,6 @@ class Checker {
   }
 
   Record& record_;
-  const std::vector<MeasuredSignal>& velocities_;
   const Machine* declared_;
   std::size_t half_;
 };
@@ -761,14 +765,10 @@ double resolution_of(const std::vector<double>& value) {
   return 0;
 }
 
-void check_record(Record& record, const std::vector<MeasuredSignal>& velocities,
-                  const Machine* declared) {
-  Checker(record, velocities, declared).run();
-}
+void check_record(Record& record, const Machine* declared) { Checker(record, declared).run(); }
 
 void check_against(Record& record, const Machine& declared) {
-  const std::vector<MeasuredSignal> none;
-  Checker(record, none, &declared).run_declared();
+  Checker(record, &declared).run_declared();
 }
 
 }  // namespace vcnc

@@ -6,7 +6,8 @@
 // that would explain it; what is only suspicious becomes a warning of the record.
 //
 //   velocity    regression of the velocity signal on the derivative of the position: the slope must
-//               be 1 within 10 %, the correlation above 0.7
+//               be 1 within 10 %, the correlation above 0.7; 0.5 ms after it at most
+//               (late_velocity.hpp)
 //   command     correlation of the position's steps with those of every axis' command; the slope of
 //               what it is ahead over the command's velocity: 2 ms at most
 //               a position that stays while its command goes on, or that is the command itself:
@@ -30,10 +31,8 @@
 namespace vcnc {
 
 /// Adds warnings and the resolutions of the signals to `record`. Throws MeasurementError where a
-/// signal cannot be what it is said to be. `velocities` [m/s or rad/s] are signals of their axes
-/// that only serve to check; `declared` may be null.
-void check_record(Record& record, const std::vector<MeasuredSignal>& velocities,
-                  const Machine* declared);
+/// signal cannot be what it is said to be. `declared` may be null.
+void check_record(Record& record, const Machine* declared);
 
 /// What of that needs a machine, where the record was made without one or for another: ranges,
 /// speeds, forces and inertias. Warnings that the record has already are not repeated.

@@ -7,10 +7,11 @@ namespace vcnc {
 
 namespace {
 
-constexpr std::array<std::pair<SignalKind, std::string_view>, 13> kKindNames{{
+constexpr std::array<std::pair<SignalKind, std::string_view>, 14> kKindNames{{
     {SignalKind::command, "command"},
     {SignalKind::position, "position"},
     {SignalKind::twist, "twist"},
+    {SignalKind::velocity, "velocity"},
     {SignalKind::force, "force"},
     {SignalKind::applied_force, "applied force"},
     {SignalKind::added_force, "added force"},

@@ -20,6 +20,7 @@ inline constexpr std::size_t kLateTruth = 3;
 /// One value per cycle of 1 ms, SI; NaN where nothing is said of this axis.
 struct AxisReplay {
   SharedSeries measured, twist, force;
+  SharedSeries velocity;      ///< of the motor side; empty: not asked for
   std::vector<double> truth;  ///< true position, the last of a cycle k belongs to the instant k ms
   std::size_t per_cycle = kTruthPerCycle;  ///< of truth; fewer: the last ones
 

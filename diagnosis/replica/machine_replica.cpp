@@ -8,6 +8,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "diagnosis/records/late_velocity.hpp"
 #include "diagnosis/records/series.hpp"
 #include "diagnosis/replica/effect_stage.hpp"
 #include "diagnosis/search/candidate.hpp"
@@ -67,11 +68,21 @@ std::vector<double> at_cycles(const std::vector<double>& value, double period, s
   return result;
 }
 
-std::vector<ComparedChannel> channels_of(const Record& record, const CommandedMotion& motion) {
+/// Whether something else tells where the motor of an axis is.
+bool motor_is_told(const Record& record, const Machine& declared, std::size_t axis) {
+  return record.find(SignalKind::twist, axis) ||
+         (record.find(SignalKind::position, axis) &&
+          declared.axes[axis].servo.feedback == ServoParams::Feedback::motor);
+}
+
+std::vector<ComparedChannel> channels_of(const Record& record, const CommandedMotion& motion,
+                                         const Machine& declared) {
   std::vector<ComparedChannel> channels;
   for (const MeasuredSignal& signal : record.signals) {
     if (!is_compared(signal.kind)) continue;
     if (signal.kind == SignalKind::position && motion.followed[signal.axis]) continue;
+    if (signal.kind == SignalKind::velocity && motor_is_told(record, declared, signal.axis))
+      continue;
     if (is_reading(signal.kind) || motion.told[signal.axis] == CommandedMotion::Told::command)
       channels.push_back({signal.kind, signal.axis});
   }
@@ -178,7 +189,10 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
     : declared_(declared), period_(record.period), samples_(record.samples()) {
   if (samples_ < 2) throw std::invalid_argument("holds no motion");
   const CommandedMotion motion = commanded_motion(record);
-  channels_ = channels_of(record, motion);
+  channels_ = channels_of(record, motion, declared);
+  for (const ComparedChannel& c : channels_)
+    if (c.kind == SignalKind::velocity)
+      late_velocity_[c.axis] = lateness_of_velocity(record, c.axis).value_or(0);
   probes_ = std::any_of(channels_.begin(), channels_.end(),
                         [](const ComparedChannel& c) { return is_reading(c.kind); });
   known_ = motion.known;
@@ -320,12 +334,28 @@ AxisReplays MachineReplica::axes_of(const Hypothesis& h) const {
 /// With its signals at the record's samples.
 AxisReplay MachineReplica::replayed(const Hypothesis& h, std::size_t axis) const {
   AxisReplay replay = replay_axis(h.machine, h.actual, axis, motion_);
-  sample_as_recorded(replay);
+  sample_as_recorded(replay, axis);
   return replay;
 }
 
-void MachineReplica::sample_as_recorded(AxisReplay& replay) const {
+void MachineReplica::sample_as_recorded(AxisReplay& replay, std::size_t axis) const {
+  if (const auto& late = late_velocity_[axis])
+    replay.velocity = as_recorded(motor_velocity(replay, axis), *late);
   for (SharedSeries* s : {&replay.measured, &replay.twist, &replay.force}) *s = as_recorded(*s);
+}
+
+/// At every cycle, from the two beside it.
+std::vector<double> MachineReplica::motor_velocity(const AxisReplay& replay,
+                                                   std::size_t axis) const {
+  const bool of_load = declared_.axes[axis].servo.feedback == ServoParams::Feedback::load;
+  const auto motor = [&](std::size_t k) {
+    return replay.measured[k] - (of_load ? replay.twist[k] : 0);
+  };
+  const std::size_t cycles = replay.measured.size();
+  std::vector<double> velocity(cycles, 0.0);
+  for (std::size_t k = 1; k + 1 < cycles; ++k)
+    velocity[k] = (motor(k + 1) - motor(k - 1)) / (2 * kCycleTime);
+  return velocity;
 }
 
 /// On the anchor's axes.
@@ -424,17 +454,18 @@ Deflections MachineReplica::off_record(const Deflections& reading) const {
   return off;
 }
 
-/// Values at the record's samples of what is known at every cycle.
-std::vector<double> MachineReplica::as_recorded(const std::vector<double>& per_cycle) const {
+/// Values at the record's samples of what is known at every cycle, and was recorded late [s].
+std::vector<double> MachineReplica::as_recorded(const std::vector<double>& per_cycle,
+                                                double late) const {
   std::vector<double> result(samples_, kMissing);
-  const bool same = std::abs(period_ - kCycleTime) < 1e-9;
+  const bool same = late == 0 && std::abs(period_ - kCycleTime) < 1e-9;
   for (std::size_t i = 0; i < samples_; ++i) {
     if (!known_[i]) continue;
     if (same) {
       result[i] = per_cycle[i];
       continue;
     }
-    const double at = static_cast<double>(i) * period_ / kCycleTime;
+    const double at = std::max(0.0, (static_cast<double>(i) * period_ - late) / kCycleTime);
     const auto k = static_cast<std::size_t>(at);
     if (k + 1 < per_cycle.size())
       result[i] = per_cycle[k] + (per_cycle[k + 1] - per_cycle[k]) * (at - static_cast<double>(k));
@@ -451,6 +482,9 @@ Prediction MachineReplica::assembled(const AxisReplays& axes, const Deflections&
         break;
       case SignalKind::twist:
         all.push_back(axes[channel.axis]->twist);
+        break;
+      case SignalKind::velocity:
+        all.push_back(axes[channel.axis]->velocity);
         break;
       case SignalKind::force:
         all.push_back(axes[channel.axis]->force);
@@ -492,7 +526,7 @@ std::vector<SeriesOfChannels> MachineReplica::of_unknown_forces() const {
     CommandedMotion motion = motion_;
     for (double& f : motion.unknown[axis].*of) f *= 1 + kUnknownForce;
     AxisReplay replay = replay_axis(declared.machine, declared.actual, axis, motion);
-    sample_as_recorded(replay);
+    sample_as_recorded(replay, axis);
     AxisReplays changed = axes;
     changed[axis] = std::make_shared<const AxisReplay>(std::move(replay));
     Hypothesis other = declared;
@@ -540,7 +574,7 @@ std::vector<Prediction> MachineReplica::predict_all(const std::vector<Machine>& 
       if (!watched && group.size() > 1)
         watched = watched_[axis]->find_or_make(print, [&] {
           WatchedReplay w = replay_watched(first.machine, first.actual, axis, motion_);
-          sample_as_recorded(w.replay);
+          sample_as_recorded(w.replay, axis);
           return w;
         });
       for (const std::size_t i : group) {
@@ -556,7 +590,7 @@ std::vector<Prediction> MachineReplica::predict_all(const std::vector<Machine>& 
     for (const std::size_t i : left) variants.push_back({all[i].machine, all[i].actual});
     std::vector<AxisReplay> replays = replay_variants(variants, axis, motion_);
     for (std::size_t n = 0; n < left.size(); ++n) {
-      sample_as_recorded(replays[n]);
+      sample_as_recorded(replays[n], axis);
       made[all[left[n]].axis[axis]] = std::make_shared<const AxisReplay>(std::move(replays[n]));
     }
     for (std::size_t i = 0; i < all.size(); ++i)

@@ -11,6 +11,10 @@
 // like is not seen then, and no position is compared. Records at another rate than the bus cycle
 // are brought to 1 ms by the spline of the commands and back by straight lines.
 //
+// The velocity of a motor is the slope of its position over two cycles, as late as the record has
+// it (late_velocity.hpp). It is compared where no position tells of the motor: that of the loop is
+// the load's, or there is none; else it would be the same encoder twice.
+//
 // What has been computed is kept and found again by what it depends on: changing something of X
 // does not simulate Y, changing the probe simulates no axis, and what only displaces the tool
 // centre does not simulate the drive. The results are the same as without. Several machines at a
@@ -87,23 +91,25 @@ class MachineReplica : public Replica {
                                              const AxisReplays& axes) const;
   Deflections reading_of(const Hypothesis& hypothesis, const AxisReplays& axes) const;
   AxisReplay replayed(const Hypothesis& hypothesis, std::size_t axis) const;
-  void sample_as_recorded(AxisReplay& replay) const;
+  void sample_as_recorded(AxisReplay& replay, std::size_t axis) const;
   Prediction predict(const Hypothesis& hypothesis, const AxisReplays& axes) const;
   void hold_against(const OnTable& it);
   void forget_loops_of_followed(Machine& machine) const;
   bool knows_forces() const;  ///< of some axis, by apply()
   Prediction assembled(const AxisReplays& axes, const Deflections& reading) const;
   Deflections off_record(const Deflections& reading) const;
-  std::vector<double> as_recorded(const std::vector<double>& per_cycle) const;
+  std::vector<double> motor_velocity(const AxisReplay& replay, std::size_t axis) const;
+  std::vector<double> as_recorded(const std::vector<double>& per_cycle, double late = 0) const;
 
   Machine declared_;
   double period_;
   std::size_t samples_;
   std::vector<ComparedChannel> channels_;
-  bool probes_ = false;      ///< some channel is a reading
-  CommandedMotion motion_;   ///< at 1 ms
-  std::vector<char> known_;  ///< at the record's rate
-  Deflections measured_;     ///< at 1 ms; empty where not recorded
+  PerAxis<std::optional<double>> late_velocity_;  ///< of those compared, after the position [s]
+  bool probes_ = false;                           ///< some channel is a reading
+  CommandedMotion motion_;                        ///< at 1 ms
+  std::vector<char> known_;                       ///< at the record's rate
+  Deflections measured_;                          ///< at 1 ms; empty where not recorded
   std::unique_ptr<Piece> piece_;
   Counterpart against_;
   Vec3 across_ = Vec3::Zero();  ///< unit normal of the plane that a bar stays in; zero: none

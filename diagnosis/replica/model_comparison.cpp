@@ -29,7 +29,8 @@ ModelResiduals model_residuals(const Record& record, const Replica& replica, con
     for (std::size_t c = 0; c < result.channels.size(); ++c) {
       const auto [kind, axis] = result.channels[c];
       const std::vector<double>& measured = record.find(kind, axis)->value;
-      const bool drive = kind == SignalKind::force || kind == SignalKind::twist;
+      const bool drive =
+          kind == SignalKind::force || kind == SignalKind::twist || kind == SignalKind::velocity;
       const std::vector<char> counts = drive ? moving(record, axis) : inside;
       std::vector<double>& r = residual.emplace_back(measured.size(), kMissing);
       for (std::size_t k = 0; k < r.size(); ++k)
@@ -47,6 +48,8 @@ ShownUnit shown_unit(const ComparedChannel& channel) {
   switch (channel.kind) {
     case SignalKind::force:
       return {rotary ? "N m" : "N", 1};
+    case SignalKind::velocity:
+      return rotary ? ShownUnit{"deg/s", 1 / kDegree} : ShownUnit{"mm/s", 1e3};
     case SignalKind::cosine:
     case SignalKind::sine:
       return {"mV", 1e3};

@@ -23,7 +23,7 @@ struct ModelResiduals {
 ModelResiduals model_residuals(const Record& record, const Replica& replica, const Machine& before,
                                const Machine& after);
 
-/// "um", "arcsec", "N", "N m" or "mV", and the factor from SI.
+/// "um", "arcsec", "mm/s", "deg/s", "N", "N m" or "mV", and the factor from SI.
 struct ShownUnit {
   const char* name;
   double factor;

@@ -33,7 +33,9 @@ void mask_standing(const Record& record, const std::vector<ComparedChannel>& cha
   const auto reach = static_cast<std::size_t>(std::round(kCurveReach / record.period));
   for (std::size_t c = 0; c < valid.size(); ++c) {
     const ComparedChannel& channel = channels[c];
-    if (channel.kind != SignalKind::force && channel.kind != SignalKind::twist) continue;
+    if (channel.kind != SignalKind::force && channel.kind != SignalKind::twist &&
+        channel.kind != SignalKind::velocity)
+      continue;
     const MeasuredSignal* command = record.find(SignalKind::command, channel.axis);
     if (!command) continue;
     const double slow = (is_rotary(channel.axis) ? kStandingRotary : kStandingLinear) *

@@ -14,11 +14,15 @@ struct Difference {
   double sum = 0, n = 0;
 };
 
-Difference difference(const Evidence& evidence, const Prediction& a, const Prediction& b,
-                      std::size_t channel) {
+/// One signal of two machines.
+struct Both {
+  SharedSeries a, b;
+};
+
+Difference difference(const Evidence& evidence, const Both& of) {
   Difference d;
-  if (a[channel].shares(b[channel])) return d;
-  const std::vector<double>&x = a[channel], &y = b[channel];
+  if (of.a.shares(of.b)) return d;
+  const std::vector<double>&x = of.a, &y = of.b;
   for (const RecordBlock& block : evidence.partition().blocks)
     for (std::size_t k = block.begin; k < block.end; ++k)
       if (const double by = x[k] - y[k]; std::isfinite(by)) d.sum += by * by, d.n += 1;
@@ -36,10 +40,18 @@ bool goes_anywhere(const Evidence& evidence, const std::vector<double>& position
   return high - low > kFar;
 }
 
+/// How far a speed went.
+std::vector<double> way_of(const std::vector<double>& velocity, double period) {
+  std::vector<double> way(velocity.size(), kMissing);
+  double gone = 0;
+  for (std::size_t k = 0; k < way.size(); ++k)
+    if (std::isfinite(velocity[k])) way[k] = gone += velocity[k] * period;
+  return way;
+}
+
 /// Sum of squares of what a tool position changes by across the way it goes, or at all where it
 /// stands.
-Difference across_the_way(const Evidence& evidence, const Prediction& a, const Prediction& b,
-                          const std::vector<std::size_t>& components) {
+Difference across_the_way(const Evidence& evidence, const std::vector<Both>& components) {
   constexpr std::size_t kReach = 5;      // samples to either side
   constexpr double kStandsBelow = 1e-3;  // [m/s]
   const double least = 2 * kReach * evidence.record().period * kStandsBelow;
@@ -48,7 +60,7 @@ Difference across_the_way(const Evidence& evidence, const Prediction& a, const P
     for (std::size_t k = block.begin + kReach; k + kReach < block.end; ++k) {
       Vec3 by = Vec3::Zero(), way = Vec3::Zero();
       for (std::size_t i = 0; i < components.size(); ++i) {
-        const std::vector<double>&x = a[components[i]], &y = b[components[i]];
+        const std::vector<double>&x = components[i].a, &y = components[i].b;
         const auto at = static_cast<Eigen::Index>(i);
         by[at] = x[k] - y[k];
         way[at] = y[k + kReach] - y[k - kReach];
@@ -61,6 +73,18 @@ Difference across_the_way(const Evidence& evidence, const Prediction& a, const P
   return d;
 }
 
+Both ways_of(const Both& velocity, double period) {
+  if (velocity.a.shares(velocity.b)) {
+    const SharedSeries way = way_of(velocity.a, period);
+    return {way, way};
+  }
+  return {way_of(velocity.a, period), way_of(velocity.b, period)};
+}
+
+bool has(const std::vector<ComparedChannel>& channels, const ComparedChannel& channel) {
+  return std::find(channels.begin(), channels.end(), channel) != channels.end();
+}
+
 }  // namespace
 
 Consequence consequence(const Evidence& evidence, const Prediction& a, const Prediction& b) {
@@ -69,16 +93,22 @@ Consequence consequence(const Evidence& evidence, const Prediction& a, const Pre
                                   [](const auto& c) { return is_reading(c.kind); });
   Consequence of;
   double sum = 0, n = 0;  // of the contour
-  std::vector<std::size_t> tool, linear;
+  std::vector<Both> tool, linear;
   for (std::size_t c = 0; c < channels.size(); ++c) {
-    const Difference d = difference(evidence, a, b, c);
-    const bool reading = is_reading(channels[c].kind);
-    if (channels[c].kind == SignalKind::tool_position) tool.push_back(c);
-    const bool of_linear = channels[c].kind == SignalKind::position && !is_rotary(channels[c].axis);
-    if (of_linear && goes_anywhere(evidence, b[c])) linear.push_back(c);
+    const auto [kind, axis] = channels[c];
+    const Both signal{a[c], b[c]};
+    const Difference d = difference(evidence, signal);
+    const bool reading = is_reading(kind);
+    if (kind == SignalKind::tool_position) tool.push_back(signal);
+    const bool only_speed =
+        kind == SignalKind::velocity && !has(channels, {SignalKind::position, axis});
+    const bool of_linear = (kind == SignalKind::position || only_speed) && !is_rotary(axis);
     if (probed ? reading : of_linear) {
-      sum += d.sum;
-      n = std::max(n, d.n);
+      const Both position = only_speed ? ways_of(signal, evidence.record().period) : signal;
+      const Difference moved = only_speed ? difference(evidence, position) : d;
+      sum += moved.sum;
+      n = std::max(n, moved.n);
+      if (of_linear && goes_anywhere(evidence, position.b)) linear.push_back(position);
     }
     const double noise = evidence.noise().channels[c].rms;
     if (d.n == 0 || noise <= 0) continue;
@@ -89,7 +119,7 @@ Consequence consequence(const Evidence& evidence, const Prediction& a, const Pre
   // A single axis has no contour but its position.
   if (!probed && linear.size() > 1) tool = linear;
   if (!tool.empty()) {
-    const Difference d = across_the_way(evidence, a, b, tool);
+    const Difference d = across_the_way(evidence, tool);
     sum = d.sum;
     n = d.n;
   }

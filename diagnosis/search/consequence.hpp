@@ -7,7 +7,8 @@ namespace vcnc {
 
 struct Consequence {
   /// RMS of what it does to the contour: to the reading of probe or bar where there is one, to the
-  /// tool position across the way that it goes, else to the positions of the linear axes [um].
+  /// tool position across the way that it goes, else to the positions of the linear axes, or to
+  /// what their motors go where no position is recorded [um].
   double contour_um = 0;
   /// Largest RMS of what it does to any signal, and to any but the readings, of the noise of one
   /// sample.

@@ -127,6 +127,18 @@ TEST(ImportTable, ASoundTableBecomesARecordInSiWithItsLapsAndNoComplaint) {
   EXPECT_EQ(record.warnings.size(), 0u) << all_warnings(record);
 }
 
+TEST(ImportTable, AVelocityIsKeptAndToldWhereItIsLate) {
+  const Record sound = imported(sound_map());
+  const MeasuredSignal* velocity = sound.find(SignalKind::velocity, 0);
+  ASSERT_NE(velocity, nullptr);
+  EXPECT_NEAR(velocity->value[1000], LinearAxis::velocity(0.996), 1e-6);
+  Columns late = columns();
+  late["vel"] = [](double t) { return LinearAxis::velocity(t - 0.007); };
+  const Record record = imported(sound_map(), table_of(late));
+  EXPECT_TRUE(warned(record, "\"vel\" (velocity X) comes 3 ms after the position of X"))
+      << all_warnings(record);
+}
+
 TEST(ImportTable, UnitScaleSignAndOffsetComeOutInSi) {
   Columns all = columns();
   all["pos"] = [](double t) { return -1e6 * (LinearAxis::position(t - 0.004) - 0.001); };
