@@ -8,6 +8,7 @@
 #include <map>
 #include <mutex>
 #include <numeric>
+#include <set>
 
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/records/measured_table.hpp"
@@ -19,6 +20,7 @@
 #include "diagnosis/search/refit.hpp"
 #include "diagnosis/search/screening.hpp"
 #include "diagnosis/search/trial.hpp"
+#include "diagnosis/search/trial_values.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {
@@ -55,6 +57,11 @@ const std::vector<std::string> kGains{"kv_error",
                                       "position_lag_us",
                                       "velocity_lag_us",
                                       "feedforward_lag_us"};
+
+/// What of a healthy drive hangs on where its axis is: what repeats along the way, what pulls.
+const std::vector<std::string> kAlongTheWay{
+    "torque_ripple",      "cogging",          "transmission_error", "encoder_eccentricity",
+    "load_encoder_error", "weight_imbalance", "cable_chain",        "friction_asymmetry"};
 
 /// What a probe and the geometry of a healthy machine have, too.
 const std::vector<std::string> kMeasuring{"surface_friction", "probe_gain",     "cross_talk",
@@ -190,7 +197,15 @@ class Commissioner {
       if (!is_driven(of_.record, axis)) continue;
       if (!go("friction and gains of " + place, axis)) break;
       fit_friction(place);
-      fit_best_of(the(kGains, place), place, [&] { return go("gains of " + place, axis); });
+      const auto fit_gains = [&] {
+        fit_best_of(the(kGains, place), place, [&] { return go("gains of " + place, axis); });
+      };
+      fit_gains();
+      if (fit_along_the_way(place, axis)) {
+        fit_friction_anew(place);
+        fit_gains();
+      }
+      fit_friction_of_motor(place);
       rest(machine_);
     }
     fit_together();
@@ -239,12 +254,26 @@ class Commissioner {
   }
 
   /// Whether it gains what noise would not, if noise were all that is left, and that share of what
-  /// is more than noise.
-  bool gains_enough(const FittedMachine& now, const FittedMachine& better,
+  /// is more than noise in the signals of a place.
+  bool gains_enough(const FittedMachine& now, const FittedMachine& better, const std::string& place,
                     double least_share = 0) const {
-    const double above = now.held_out - evidence_.count(Role::held_out);
     return now.held_out - better.held_out >
-           std::max(options_.least_gain * std::max(1.0, per_sample(now)), least_share * above);
+           std::max(options_.least_gain * std::max(1.0, per_sample(now)),
+                    least_share * above_noise(now, place));
+  }
+
+  /// Of an axis its own signals and the readings, else all.
+  double above_noise(const FittedMachine& m, const std::string& place) const {
+    const auto axis = static_cast<std::size_t>(
+        std::find(kAxisNames.begin(), kAxisNames.end(), place) - kAxisNames.begin());
+    const std::vector<double> chi2 = evidence_.chi2_of(m.residual, Role::held_out);
+    double above = 0;
+    for (std::size_t c = 0; c < chi2.size(); ++c) {
+      const ComparedChannel& channel = of_.replica.channels()[c];
+      if (axis == kAxisCount || is_reading(channel.kind) || channel.axis == axis)
+        above += std::max(0.0, chi2[c] - evidence_.count(c, Role::held_out));
+    }
+    return above;
   }
 
   void accept(FittedMachine better, const std::string& place, const std::string& chosen) {
@@ -258,7 +287,72 @@ class Commissioner {
     auto [best, law] = with_friction(place, {});
     if (law.empty()) return;
     accept(std::move(best), place, law);
-    fit_friction_of_motor(place);
+  }
+
+  /// One after the other; whether there was something.
+  bool fit_along_the_way(const std::string& place, std::size_t axis) {
+    std::vector<std::size_t> left = the(kAlongTheWay, place);
+    const std::size_t all = left.size();
+    while (!left.empty() && go("ripple and waves of " + place, axis)) {
+      std::vector<FittedMachine> fitted = best_along_the_way(left);
+      if (fitted.empty()) break;
+      std::vector<std::size_t> few;
+      std::vector<double> leaves;
+      for (const FittedMachine& f : fitted) {
+        few.push_back(f.added.back().candidate);
+        leaves.push_back(f.held_out);
+      }
+      const auto best = static_cast<std::size_t>(simplest_of_best(few, leaves));
+      if (!gains_enough(machine_, fitted[best], place, kShareOfLeft)) break;
+      std::erase(left, few[best]);
+      accept(std::move(fitted[best]), place, told(candidates_[few[best]]));
+    }
+    return left.size() < all;
+  }
+
+  /// The machine with one of some candidates each, those that do most by their sensitivities.
+  std::vector<FittedMachine> best_along_the_way(const std::vector<std::size_t>& some) const {
+    constexpr std::size_t kFew = 3;
+    std::vector<Candidate> chosen;
+    for (const std::size_t c : some) chosen.push_back(candidates_[c]);
+    const LinearPart linear = machine_.linear();
+    const Ground ground(evidence_, machine_.residual, linear);
+    const TrialValuesOf values(evidence_, machine_.machine, machine_.residual, options_.least_gain);
+    std::vector<TrialColumns> tried =
+        simulate_trials(evidence_, machine_.machine, machine_.prediction, chosen,
+                        trials(machine_.machine, chosen, values), [](double) { return true; });
+    std::vector<FittedMachine> fitted;
+    std::set<std::size_t> begun;
+    for (const Screened& s : screen(evidence_, ground, {}, chosen, tried)) {
+      const TrialColumns& t = tried[s.trial];
+      const std::size_t c = t.trial.candidate;
+      if (begun.size() == kFew || !(s.gain > options_.least_gain)) break;
+      if (!begun.insert(c).second) continue;
+      FittedMachine& m = fitted.emplace_back(machine_);
+      set_whole_numbers(m.machine, chosen[c], t.trial);
+      m.added.push_back(
+          {.candidate = some[c],
+           .numbers = start_of(chosen[c], t.trial, s.size, t.own.fitted.diagonal().cwiseSqrt())});
+      m.nuisances = without(m.nuisances, m.numbers());
+    }
+    evidence_.each_together(fitted.size(), [&](std::size_t i) { converge(evidence_, fitted[i]); });
+    return fitted;
+  }
+
+  /// The law of friction beside all that was found since.
+  void fit_friction_anew(const std::string& place) {
+    const std::vector<std::string>& of_law = kFrictionLaws.back().effects;
+    for (const AddedEffect& a : machine_.added) {
+      if (std::find(of_law.begin(), of_law.end(), candidates_[a.candidate].effect) != of_law.end())
+        continue;
+      for (const FreeNumber& n : candidates_[a.candidate].numbers)
+        move_number(before_friction_.machine, n.key, number_of(machine_.machine, n.key));
+      before_friction_.added.push_back(a);
+    }
+    before_friction_.nuisances = without(before_friction_.nuisances, before_friction_.numbers());
+    auto [best, law] = with_friction(place, {});
+    if (!law.empty() && gains_enough(machine_, best, place))
+      accept(std::move(best), place, law + " anew");
   }
 
   /// The axis as it was before its friction was fitted, with the law that does best and with what
@@ -278,7 +372,7 @@ class Commissioner {
     });
     const FittedMachine* best = &from;
     for (const FittedMachine& trial : trials)
-      if (gains_enough(*best, trial)) best = &trial;
+      if (gains_enough(*best, trial, place)) best = &trial;
     if (best == &from) return {};
     const auto law = static_cast<std::size_t>(best - trials.data());
     return {std::move(trials[law]), kFrictionLaws[law].name};
@@ -289,8 +383,8 @@ class Commissioner {
   void fit_friction_with(std::size_t gain, const std::string& place) {
     if (!candidates_[gain].of_loops) return;
     auto [better, law] = with_friction(place, {gain});
-    if (law.empty() || !gains_enough(machine_, better, kShareOfLeft) || is_as_declared(better) ||
-        stands_for_force(better))
+    if (law.empty() || !gains_enough(machine_, better, place, kShareOfLeft) ||
+        is_as_declared(better) || stands_for_force(better))
       return;
     accept(std::move(better), place, law + " with " + told(candidates_[gain]));
   }
@@ -301,7 +395,7 @@ class Commissioner {
     if (motor.empty()) return;
     FittedMachine better = with_candidates(candidates_, machine_, motor);
     converge(evidence_, better);
-    if (gains_enough(machine_, better, kShareOfSide))
+    if (gains_enough(machine_, better, place, kShareOfSide))
       accept(std::move(better), place, "part of its friction on the motor's side");
   }
 
@@ -378,7 +472,7 @@ class Commissioner {
       });
       const auto best = static_cast<std::size_t>(simplest_of_best(few, leaves));
       FittedMachine& better = fitted[best];
-      if (!gains_enough(machine_, better, kShareOfLeft)) return;
+      if (!gains_enough(machine_, better, place, kShareOfLeft)) return;
       std::erase(left, few[best]);
       if (is_as_declared(better))
         fit_friction_with(few[best], place);
