@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -101,8 +102,10 @@ FittedMachine with_candidates(const std::vector<Candidate>& candidates,
       const bool shape =
           std::find(candidate.shape.begin(), candidate.shape.end(), i) != candidate.shape.end();
       const double declared = number_of(machine.machine, n.key);
-      // What cannot be negative would not leave zero.
-      const double start = n.one_sided ? 0.3 * std::abs(n.typical) : 0;
+      // What cannot be negative would not leave zero, nor would bristles of no stiffness.
+      const double start = shape         ? std::abs(n.typical)
+                           : n.one_sided ? 0.3 * std::abs(n.typical)
+                                         : 0;
       FreedNumber freed{.number = n, .value = declared != 0 ? declared : start, .shape = shape};
       freed.number.typical = std::max(std::abs(n.typical), 1e-9);
       added.numbers.push_back(freed);
@@ -201,6 +204,7 @@ class Commissioner {
         fit_best_of(the(kGains, place), place, [&] { return go("gains of " + place, axis); });
       };
       fit_gains();
+      rest(machine_);
       if (fit_along_the_way(place, axis)) {
         fit_friction_anew(place);
         fit_gains();
@@ -306,13 +310,14 @@ class Commissioner {
       if (!gains_enough(machine_, fitted[best], place, kShareOfLeft)) break;
       std::erase(left, few[best]);
       accept(std::move(fitted[best]), place, told(candidates_[few[best]]));
+      rest(machine_);
     }
     return left.size() < all;
   }
 
   /// The machine with one of some candidates each, those that do most by their sensitivities.
   std::vector<FittedMachine> best_along_the_way(const std::vector<std::size_t>& some) const {
-    constexpr std::size_t kFew = 3;
+    constexpr std::size_t kFew = 2;
     std::vector<Candidate> chosen;
     for (const std::size_t c : some) chosen.push_back(candidates_[c]);
     const LinearPart linear = machine_.linear();
@@ -339,17 +344,23 @@ class Commissioner {
     return fitted;
   }
 
-  /// The law of friction beside all that was found since.
+  /// The law of friction beside all that was found since, which goes along.
   void fit_friction_anew(const std::string& place) {
     const std::vector<std::string>& of_law = kFrictionLaws.back().effects;
-    for (const AddedEffect& a : machine_.added) {
-      if (std::find(of_law.begin(), of_law.end(), candidates_[a.candidate].effect) != of_law.end())
+    LinearPart& along = before_friction_.nuisances;
+    for (std::size_t i = 0; i < machine_.nuisances.numbers.size(); ++i) {
+      const FreedNumber& n = machine_.nuisances.numbers[i];
+      if (has_key(along.numbers, n.number.key) ||
+          std::find(of_law.begin(), of_law.end(), effect_of_key(n.number.key)) != of_law.end())
         continue;
-      for (const FreeNumber& n : candidates_[a.candidate].numbers)
-        move_number(before_friction_.machine, n.key, number_of(machine_.machine, n.key));
-      before_friction_.added.push_back(a);
+      along.numbers.push_back(n);
+      along.columns.push_back(machine_.nuisances.columns[i]);
     }
-    before_friction_.nuisances = without(before_friction_.nuisances, before_friction_.numbers());
+    Machine& machine = before_friction_.machine;
+    for (const std::size_t c : the(kAlongTheWay, place))
+      for (const FreeNumber& n : candidates_[c].numbers)
+        move_number(machine, n.key, number_of(machine_.machine, n.key));
+    machine = with(machine, along.numbers);
     auto [best, law] = with_friction(place, {});
     if (!law.empty() && gains_enough(machine_, best, place))
       accept(std::move(best), place, law + " anew");
@@ -393,10 +404,37 @@ class Commissioner {
   void fit_friction_of_motor(const std::string& place) {
     const std::vector<std::size_t> motor = the({"motor_friction"}, place);
     if (motor.empty()) return;
-    FittedMachine better = with_candidates(candidates_, machine_, motor);
-    converge(evidence_, better);
-    if (gains_enough(machine_, better, place, kShareOfSide))
-      accept(std::move(better), place, "part of its friction on the motor's side");
+    // It does little that friction of the load does not, so no way leads there from none of it.
+    constexpr std::array kShares{0.1, 0.35};
+    std::vector<FittedMachine> better(kShares.size());
+    evidence_.each_together(better.size(), [&](std::size_t i) {
+      better[i] = with_candidates(candidates_, machine_, motor);
+      move_to_motor(better[i], place, kShares[i]);
+      converge(evidence_, better[i]);
+    });
+    const auto best = std::min_element(
+        better.begin(), better.end(),
+        [](const FittedMachine& a, const FittedMachine& b) { return a.held_out < b.held_out; });
+    if (gains_enough(machine_, *best, place, kShareOfSide))
+      accept(std::move(*best), place, "part of its friction on the motor's side");
+  }
+
+  /// A share of the dry and viscous friction of the load.
+  static void move_to_motor(FittedMachine& m, const std::string& place, double share) {
+    const std::string of_axis = "effects." + place + ".";
+    for (const auto& [from, to] : {std::pair{"coulomb.level", "motor_friction.level"},
+                                   std::pair{"viscous.coefficient", "motor_friction.viscous"}}) {
+      double moved = 0;
+      for (AddedEffect& a : m.added)
+        for (FreedNumber& n : a.numbers) {
+          if (n.number.key.starts_with(of_axis + from)) {
+            moved = share * n.value;
+            n.value -= moved;
+          }
+          if (n.number.key.starts_with(of_axis + to)) n.value = moved;
+        }
+    }
+    m.machine = with(std::move(m.machine), m.numbers());
   }
 
   /// Of those that leave nearly the least, the first with the fewest numbers.

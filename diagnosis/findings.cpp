@@ -544,6 +544,12 @@ class Report {
     });
   }
 
+  /// A position of a linear axis, or where the tool is.
+  static bool is_length(const ComparedChannel& channel) {
+    return is_reading(channel.kind) ||
+           (channel.kind == SignalKind::position && !is_rotary(channel.axis));
+  }
+
   /// RMS on held-out laps [SI].
   struct StillOff {
     ComparedChannel channel;
@@ -577,6 +583,9 @@ class Report {
       };
       const double loud = std::max(kLoud * noise, 0.5 * evidence_.step_of(c));
       if (std::min(is, fitted[c]) < loud || beyond(is) < kWrongOfFound * beyond(was)) continue;
+      if (is_length(evidence_.replica().channels()[c]) &&
+          beyond(is) * 1e6 < options_.least_contour_um)
+        continue;
       off.push_back({evidence_.replica().channels()[c], is, noise, was});
     }
     return off;

@@ -28,6 +28,8 @@ constexpr CommonTolerance kCommonTolerances[] = {
     {"effects.", ".windup.compliance_urad_per_Nm", 0.1, 0},
     {"effects.", ".presliding.stiffness_N_per_um", 0.5, 0},
     {"effects.", ".presliding.stiffness_Nm_per_rad", 0.5, 0},
+    {"effects.", ".motor_friction.stiffness_N_per_um", 0.5, 0},
+    {"effects.", ".motor_friction.stiffness_Nm_per_rad", 0.5, 0},
 };
 
 /// In the unit of the key.

@@ -25,6 +25,7 @@ constexpr Tolerance kTolerances[] = {
     {"effects.", ".presliding.stiffness", 0.10},
     {"effects.", ".motor_friction.level", 0.03},
     {"effects.", ".motor_friction.viscous", 0.05},
+    {"effects.", ".motor_friction.stiffness", 0.10},
     {"effects.", ".grease_drag.level", 0.05},
     {"effects.", ".nonlinear_viscous.force", 0.05},
     {"effects.", ".windup.compliance", 0.02},

@@ -177,6 +177,7 @@ void AxisDriveOf<Real>::couple(const TransmissionPort::Signal<double>& transmiss
   motor_rubs_ = transmission.motor_dry > 0 || transmission.motor_viscous > 0;
   motor_dry_ = transmission.motor_dry;
   motor_viscous_ = transmission.motor_viscous;
+  motor_stiffness_ = transmission.motor_stiffness;
   if (!(transmission.compliance > 0 || transmission.gap > 0)) return;
   two_masses_ = true;
   half_gap_ = 0.5 * transmission.gap;
@@ -518,6 +519,7 @@ Real AxisDriveOf<Real>::rub_motor(Real v_free) {
   FrictionPort::Signal<Real> terms;
   terms.dry = motor_dry_;
   terms.viscous = motor_viscous_;
+  terms.stiffness = motor_stiffness_;
   return motor_friction_.step(terms, v_motor_, v_free, kPlantTime, motor_mobility_);
 }
 

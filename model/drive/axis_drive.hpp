@@ -291,7 +291,7 @@ class AxisDriveOf {
   bool uneven_ = false;
   Real wave_{}, wave_number_{}, wave_phase_{};  ///< of an uneven transmission
   bool motor_rubs_ = false;
-  Real motor_dry_{}, motor_viscous_{};
+  Real motor_dry_{}, motor_viscous_{}, motor_stiffness_{};
 
   // Effects.
   Chains<ReceptionPort> reception_;
@@ -334,8 +334,8 @@ class AxisDriveOf {
                  servo_.integral_time, servo_.velocity_ff, servo_.acceleration_ff,
                  servo_.current_lag, servo_.force_limit, kp_, lag_share_, position_share_,
                  velocity_share_, feedforward_share_, stiffness_, damping_, half_gap_, wave_,
-                 wave_number_, wave_phase_, motor_dry_, motor_viscous_, x_load_, x_motor_,
-                 last_raw_.position, last_raw_.velocity, last_shaped_.position,
+                 wave_number_, wave_phase_, motor_dry_, motor_viscous_, motor_stiffness_, x_load_,
+                 x_motor_, last_raw_.position, last_raw_.velocity, last_shaped_.position,
                  last_shaped_.velocity),
         observer_.numbers());
   }

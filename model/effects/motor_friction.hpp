@@ -14,15 +14,19 @@ struct MotorFriction {
       .title = "Friction on the motor's side",
       .family = Family::friction,
       .brief = "friction before the elasticity of the transmission: motor bearings, seals, gear",
-      .equation = R"(F_f = F_c sgn(v_m) + B v_m,  |F_f| <= F_c at rest,  m_r v_m' = F - F_s - F_f
-F_c: level, B: viscous, both seen from the load [N, N s/m or N m, N m s/rad]; F_s: what the
-transmission carries)",
+      .equation =
+          R"(z' = v_m - sigma0 |v_m| z / F_c,  F_f = sigma0 z + B v_m,  m_r v_m' = F - F_s - F_f
+F_c: level, B: viscous, sigma0: stiffness of its bristles, all seen from the load [N, N s/m, N/m or
+N m, N m s/rad, N m/rad]; sigma0 = 0: F_f = F_c sgn(v_m) + B v_m, |F_f| <= F_c at rest;
+F_s: what the transmission carries)",
       .validity =
-          R"(Sticks exactly (model/drive/friction.hpp). Without windup or backlash motor and load are one
-mass, and it adds to the friction of the load: the same as coulomb and viscous.)",
+          R"(Without bristles it sticks exactly (model/drive/friction.hpp). Without windup or backlash motor and
+load are one mass, and level and viscous friction add to those of the load: the same as coulomb and
+viscous.)",
       .source =
           R"(Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083; Tuttle, Seering, IEEE
-Trans. Robotics and Automation 12 (1996) 368, friction of strain-wave drives)",
+Trans. Robotics and Automation 12 (1996) 368, friction of strain-wave drives; bristles: LuGre,
+Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419)",
       .signature =
           R"(Drive force jumps by 2 F_c at each reversal and rises with speed, as with friction of the load,
 but the transmission does not carry it: the twist between motor and load stays as it was.)",
@@ -31,12 +35,13 @@ but the transmission does not carry it: the twist between motor and load stays a
           "coulomb and viscous wind the transmission up by F_f/k; the two measuring systems tell",
       .showing = Showing::circle};
 
-  double level = 0;    ///< F_c [N or N m]
-  double viscous = 0;  ///< B [N s/m or N m s/rad]
+  double level = 0;      ///< F_c [N or N m]
+  double viscous = 0;    ///< B [N s/m or N m s/rad]
+  double stiffness = 0;  ///< sigma0 [N/m or N m/rad]
 
   static MotorFriction nominal(bool rotary) {
-    return rotary ? MotorFriction{.level = 5, .viscous = 10}
-                  : MotorFriction{.level = 100, .viscous = 500};
+    return rotary ? MotorFriction{.level = 5, .viscous = 10, .stiffness = 1e5}
+                  : MotorFriction{.level = 100, .viscous = 500, .stiffness = 2.5e7};
   }
   bool null() const { return level == 0 && viscous == 0; }
 
@@ -47,12 +52,16 @@ but the transmission does not carry it: the twist between motor and load stays a
     visit(rotary ? "viscous_Nms_per_rad" : "viscous_Ns_per_m", p.viscous,
           rotary ? unit::nm_s_per_rad : unit::n_s_per_m, Range{0, 1e6},
           "viscous friction, seen from the load");
+    visit(rotary ? "stiffness_Nm_per_rad" : "stiffness_N_per_um", p.stiffness,
+          rotary ? unit::nm_per_rad : unit::n_per_um, Range{0, 1e9},
+          "stiffness of its bristles; 0: none, it sticks exactly");
   }
 
   template <class T>
   void step(Port::Signal<T>& signal, const Port::Context<T>&) const {
     signal.motor_dry += T(level);
     signal.motor_viscous += T(viscous);
+    signal.motor_stiffness += T(stiffness);
   }
 };
 

@@ -164,8 +164,9 @@ struct TransmissionPort {
     T damping_ratio{};  ///< of the free resonance
     /// The load is ahead of the motor by wave sin(2 pi q/period + phase); none where wave is 0.
     T wave{}, wave_period{}, wave_phase{};
-    T motor_dry{};      ///< friction on the motor's side, seen from the load [N or N m]
-    T motor_viscous{};  ///< [N s/m or N m s/rad]
+    T motor_dry{};        ///< friction on the motor's side, seen from the load [N or N m]
+    T motor_viscous{};    ///< [N s/m or N m s/rad]
+    T motor_stiffness{};  ///< of its bristles [N/m or N m/rad], 0: none
   };
   template <class T>
   struct Context {};

@@ -59,6 +59,21 @@ TEST(Commission, TellsFrictionOfTheMotorFromThatOfTheLoad) {
   EXPECT_NEAR(number_of(c.machine, "effects.X.motor_friction.level_N"), 120, 0.05 * 120);
 }
 
+/// A screw has waves and a motor has ripple when they are healthy, and a hose pulls.
+TEST(Commission, RecoversWhatHangsOnWhereAnAxisIs) {
+  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
+  Effects effects;
+  effects.axis[kX].get<Coulomb>().level = 180;
+  effects.axis[kX].get<TransmissionError>() = {.amplitude = 2e-6, .period = 0.01, .phase = 0.5};
+  effects.axis[kX].get<CableChain>() = {.stiffness = 1500, .cubic = 0, .rest = 0.03};
+  const Commissioning c = commissioned_x(effects);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.coulomb.level_N"), 180, 0.02 * 180);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.transmission_error.amplitude_um"), 2, 0.1);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.transmission_error.period_mm"), 10, 0.1);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.cable_chain.stiffness_N_per_mm"), 1.5, 0.08);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.cable_chain.rest_mm"), 30, 2);
+}
+
 TEST(Commission, StopsInTheMidstOfAFit) {
   Effects effects;
   effects.axis[kX].get<Coulomb>().level = 180;

@@ -424,6 +424,24 @@ TEST(MotorFriction, TakesForceThatTheTransmissionDoesNotCarry) {
   }
 }
 
+// Bristles of stiffness s bend by x before they slip: F = F_c (1 - exp(-s x / F_c)) (Dahl), while
+// the load, which the transmission does not push, stays behind by its own inertia alone.
+TEST(MotorFriction, BristlesBendBeforeTheySlip) {
+  const double level = 100, stiffness = 2e7, v = 20e-6;  // [N], [N/m], [m/s]
+  AxisEffects effects;
+  effects.get<Windup>().compliance = 10e-9;
+  effects.get<MotorFriction>() = {.level = level, .stiffness = stiffness};
+  AxisDrive drive(axis(), effects);
+  for (int k = 1; k <= 1000; ++k) {
+    const AxisCycle cycle = drive.follow({v * kCycle * k, v});
+    const double x = cycle.measured;
+    if (k % 50 != 0) continue;
+    EXPECT_NEAR(cycle.force * axis().mechanics.force_limit,
+                level * (1 - std::exp(-stiffness * x / level)), 0.02 * level)
+        << k;
+  }
+}
+
 TEST(MotorFriction, OfOneMassIsThatOfTheLoad) {
   AxisEffects of_load;
   of_load.get<Coulomb>().level = 100;
