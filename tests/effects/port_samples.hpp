@@ -171,7 +171,7 @@ struct PortSamples<TransmissionPort> {
     f(s.wave_phase, within(3, 10));
     f(s.motor_dry, positive(0, rotary ? 10 : 500, 1e9));
     f(s.motor_viscous, positive(0, rotary ? 10 : 5000, 1e9));
-    f(s.motor_stiffness, positive(0, rotary ? 1e5 : 1e8, 1e15));
+    f(s.motor_stiffness, positive(0, rotary ? 1e6 : 1e8, 1e17));
   }
   template <class C, class F>
   static void context(C&, F&&, bool) {}
