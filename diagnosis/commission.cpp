@@ -33,6 +33,7 @@ constexpr double kFixed = 1e12;  ///< precision of a number that stays
 constexpr double kShareOfLeft = 0.05;
 constexpr double kShareOfSide = 0.02;   ///< the same of friction that is on the motor's side
 constexpr double kWellOff = 10;         // times the noise
+constexpr double kStandsOut = 1.5;      // times the chi-square of noise: there is something to fit
 constexpr double kNothing = 1e-3;       // of a typical size
 constexpr double kNearlyAsGood = 0.95;  ///< of the most that one promises: as good
 
@@ -102,10 +103,8 @@ FittedMachine with_candidates(const std::vector<Candidate>& candidates,
       const bool shape =
           std::find(candidate.shape.begin(), candidate.shape.end(), i) != candidate.shape.end();
       const double declared = number_of(machine.machine, n.key);
-      // What cannot be negative would not leave zero, nor would bristles of no stiffness.
-      const double start = shape         ? std::abs(n.typical)
-                           : n.one_sided ? 0.3 * std::abs(n.typical)
-                                         : 0;
+      // What cannot be negative would not leave zero.
+      const double start = n.one_sided ? 0.3 * std::abs(n.typical) : 0;
       FreedNumber freed{.number = n, .value = declared != 0 ? declared : start, .shape = shape};
       freed.number.typical = std::max(std::abs(n.typical), 1e-9);
       added.numbers.push_back(freed);
@@ -266,6 +265,21 @@ class Commissioner {
                     least_share * above_noise(now, place));
   }
 
+  /// Whether some signal is more than noise, of an axis its own ones where it has any.
+  bool stands_out(const std::string& place) const {
+    const std::vector<ComparedChannel>& channels = of_.replica.channels();
+    const auto is_own = [&](const ComparedChannel& c) {
+      return !is_reading(c.kind) && kAxisNames[c.axis] == place;
+    };
+    const bool has_own = std::any_of(channels.begin(), channels.end(), is_own);
+    const std::vector<double> chi2 = evidence_.chi2_of(machine_.residual, Role::held_out);
+    for (std::size_t c = 0; c < chi2.size(); ++c)
+      if ((!has_own || is_own(channels[c])) &&
+          chi2[c] > kStandsOut * evidence_.count(c, Role::held_out))
+        return true;
+    return false;
+  }
+
   /// Of an axis its own signals and the readings, else all.
   double above_noise(const FittedMachine& m, const std::string& place) const {
     const auto axis = static_cast<std::size_t>(
@@ -297,7 +311,7 @@ class Commissioner {
   bool fit_along_the_way(const std::string& place, std::size_t axis) {
     std::vector<std::size_t> left = the(kAlongTheWay, place);
     const std::size_t all = left.size();
-    while (!left.empty() && go("ripple and waves of " + place, axis)) {
+    while (!left.empty() && stands_out(place) && go("ripple and waves of " + place, axis)) {
       std::vector<FittedMachine> fitted = best_along_the_way(left);
       if (fitted.empty()) break;
       std::vector<std::size_t> few;
@@ -308,7 +322,10 @@ class Commissioner {
       }
       const auto best = static_cast<std::size_t>(simplest_of_best(few, leaves));
       if (!gains_enough(machine_, fitted[best], place, kShareOfLeft)) break;
-      std::erase(left, few[best]);
+      const bool spring = candidates_[few[best]].effect == CableChain::text.name;
+      std::erase_if(left, [&](std::size_t c) {  // where a spring rests stands for a weight
+        return c == few[best] || (spring && candidates_[c].effect == WeightImbalance::text.name);
+      });
       accept(std::move(fitted[best]), place, told(candidates_[few[best]]));
       rest(machine_);
     }
@@ -419,7 +436,7 @@ class Commissioner {
       accept(std::move(*best), place, "part of its friction on the motor's side");
   }
 
-  /// A share of the dry and viscous friction of the load.
+  /// A share of the dry and viscous friction of the load, on bristles of a usual stiffness.
   static void move_to_motor(FittedMachine& m, const std::string& place, double share) {
     const std::string of_axis = "effects." + place + ".";
     for (const auto& [from, to] : {std::pair{"coulomb.level", "motor_friction.level"},
@@ -432,6 +449,8 @@ class Commissioner {
             n.value -= moved;
           }
           if (n.number.key.starts_with(of_axis + to)) n.value = moved;
+          if (n.number.key.starts_with(of_axis + "motor_friction.stiffness") && n.value == 0)
+            n.value = n.number.typical;
         }
     }
     m.machine = with(std::move(m.machine), m.numbers());

@@ -6,6 +6,7 @@
 #include "diagnosis/replica/machine_replica.hpp"
 #include "diagnosis/search/freed_number.hpp"
 #include "healthy_run.hpp"
+#include "model/probe/noise.hpp"
 #include "tests/sanitized.hpp"
 
 namespace vcnc::commission_test {
@@ -72,6 +73,29 @@ TEST(Commission, RecoversWhatHangsOnWhereAnAxisIs) {
   EXPECT_NEAR(number_of(c.machine, "effects.X.transmission_error.period_mm"), 10, 0.1);
   EXPECT_NEAR(number_of(c.machine, "effects.X.cable_chain.stiffness_N_per_mm"), 1.5, 0.08);
   EXPECT_NEAR(number_of(c.machine, "effects.X.cable_chain.rest_mm"), 30, 2);
+}
+
+TEST(Commission, TakesNoiseForNoWave) {
+  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
+  Effects effects;
+  effects.axis[kX].get<Coulomb>().level = 180;
+  RunOfMachine run = reversals_in_the_air(effects);
+  for (std::size_t i = 0; i < run.record.signals.size(); ++i) {
+    MeasuredSignal& s = run.record.signals[i];
+    const double noise = s.kind == SignalKind::position ? 20e-9
+                         : s.kind == SignalKind::force  ? 2
+                                                        : 0;  // [m], [N]
+    for (std::size_t k = 0; k < s.value.size(); ++k)
+      s.value[k] += noise * gaussian_noise(5, i, k)[0];
+  }
+  MachineReplica replica(run.record, run.declared, run.piece);
+  std::vector<Candidate> all = candidates(run.declared);
+  std::erase_if(all, [](const Candidate& c) { return c.place != "X"; });
+  const Commissioning c = commission({run.record, replica, run.declared, all});
+  EXPECT_NEAR(number_of(c.machine, "effects.X.coulomb.level_N"), 180, 0.02 * 180);
+  for (const FittedNumber& n : c.numbers)
+    for (const char* wave : {"ripple", "cogging", "transmission_error", "encoder", "cable_chain"})
+      EXPECT_EQ(n.key.find(wave), std::string::npos) << n.key;
 }
 
 TEST(Commission, StopsInTheMidstOfAFit) {
