@@ -326,6 +326,7 @@ class Commissioner {
       std::erase_if(left, [&](std::size_t c) {  // where a spring rests stands for a weight
         return c == few[best] || (spring && candidates_[c].effect == WeightImbalance::text.name);
       });
+      converge_anew(evidence_, fitted[best]);  // what goes along was linear about a machine without
       accept(std::move(fitted[best]), place, told(candidates_[few[best]]));
       rest(machine_);
     }
