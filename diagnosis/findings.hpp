@@ -12,8 +12,8 @@
 //
 // A signal is still off if its RMS is over 1.5 times its noise and what is beyond the noise over a
 // twentieth of what it was: so much a model of the true cause may be wrong by, seldom more, but one
-// that only does something like it. Of a length 0.01 um, since no effect is told of less. (Chi-square of all signals does not tell: one of sixteen counts
-// little in it.)
+// that only does something like it. Of a length 0.01 um, since no effect is told of less.
+// (Chi-square of all signals does not tell: one of sixteen counts little in it.)
 //
 // In absolute mode c > 1.1 after the fit is model form error: what the model and the machine do
 // differently by themselves. Its share of the excess is told and no effect may be called a cause.
