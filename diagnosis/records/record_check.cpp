@@ -259,7 +259,7 @@ class Checker {
     }
     if (compared == 0)
       refuse(
-          "no signal can be compared with a model: at least one position, twist, force, "
+          "no signal can be compared with a model: at least one position, twist, velocity, force, "
           "deflection, or sine and cosine is needed");
     if (compared == still)
       refuse("all measured signals are constant; nothing can be learnt from the run");
