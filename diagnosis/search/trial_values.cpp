@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 
+#include "diagnosis/search/line_spectrum.hpp"
 #include "diagnosis/search/parallel.hpp"
 #include "model/axes.hpp"
 #include "model/fields.hpp"
@@ -29,10 +30,9 @@ bool is_wavelength(const FreeNumber& n) {
          contains(n.key, ".wavelength_");
 }
 
-/// Waves per travel: half a bin apart, up to where a wave is 1/200 of the travel; and about a line.
-constexpr WaveGrid kWaves{.first = 1.5, .apart = 0.5, .count = 397};
-constexpr WaveGrid kAboutLine{.first = -0.4, .apart = 0.1, .count = 9};
-constexpr double kMostSamples = 20000;    ///< of a spectrum
+constexpr WaveGrid kAboutLine{.first = -0.4, .apart = 0.1, .count = 9};  ///< waves per travel
+constexpr double kMostWaves = 2000;                                      ///< per travel
+constexpr double kSamplesPerWave = 4;     ///< at the least: shorter ones might be longer ones
 constexpr double kSameWaves = 0.75;       ///< per travel: no other line
 constexpr double kSameWavesFound = 0.05;  ///< where they were fitted
 constexpr double kSameFrequency = 1.5;    ///< [Hz]
@@ -47,22 +47,26 @@ void follow_values(std::vector<double>& found, const std::vector<double>& known,
       if (same(value, k)) value = k;
 }
 
-/// Of a long record only some samples are looked at.
-double share_of_samples(const Record& record) {
-  return std::min(1.0, kMostSamples / static_cast<double>(record.samples()));
-}
-
-/// That share of the fitted laps, at irregular intervals, so that short waves are not taken for
-/// long ones.
-std::vector<std::size_t> fitted_samples(const Evidence& evidence, double share) {
-  constexpr double kGolden = 0.6180339887498949;
+/// Samples of the fitted laps.
+std::vector<std::size_t> fitted_samples(const Evidence& evidence) {
   std::vector<std::size_t> samples;
   for (const RecordBlock& block : evidence.partition().blocks)
-    for (std::size_t k = block.begin; k < block.end && !block.held_out; ++k) {
-      const double turn = kGolden * static_cast<double>(k);
-      if (turn - std::floor(turn) <= share) samples.push_back(k);
-    }
+    for (std::size_t k = block.begin; k < block.end && !block.held_out; ++k) samples.push_back(k);
   return samples;
+}
+
+/// How many waves per travel the axis is slow enough for, mostly.
+Eigen::Index most_waves(const std::vector<double>& command, const std::vector<std::size_t>& samples,
+                        double travel) {
+  std::vector<double> steps;
+  for (const std::size_t k : samples)
+    if (k > 0)
+      if (const double step = std::abs(command[k] - command[k - 1]); step > 0)
+        steps.push_back(step);
+  if (steps.empty()) return 0;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return static_cast<Eigen::Index>(std::min(kMostWaves, travel / (kSamplesPerWave * *middle)));
 }
 
 struct Line {
@@ -71,40 +75,18 @@ struct Line {
 };
 
 /// Peaks of the powers of each channel, the strongest first.
-std::vector<Line> lines_of(const Eigen::ArrayXXd& power, double least) {
+std::vector<Line> lines_of(const Eigen::ArrayXXd& power, const WaveGrid& grid, double least) {
   std::vector<Line> lines;
   for (Eigen::Index c = 0; c < power.cols(); ++c)
     for (Eigen::Index i = 1; i + 1 < power.rows(); ++i)
       if (power(i, c) >= power(i - 1, c) && power(i, c) > power(i + 1, c) && power(i, c) >= least)
-        lines.push_back({kWaves.waves(i), power(i, c), c});
+        lines.push_back({grid.waves(i), power(i, c), c});
   std::sort(lines.begin(), lines.end(),
             [](const Line& x, const Line& y) { return x.power > y.power; });
   return lines;
 }
 
 }  // namespace
-
-Eigen::ArrayXXd line_powers(const Eigen::ArrayXd& position, const Eigen::ArrayXXd& z, double length,
-                            const WaveGrid& grid) {
-  Eigen::ArrayXXd power = Eigen::ArrayXXd::Zero(grid.count, z.cols());
-  const Eigen::ArrayXd first = 2 * kPi * grid.first / length * position,
-                       turn = 2 * kPi * grid.apart / length * position;
-  Eigen::ArrayXd s = first.sin(), c = first.cos(), was(position.size());
-  const Eigen::ArrayXd turn_s = turn.sin(), turn_c = turn.cos();
-  for (Eigen::Index row = 0; row < grid.count; ++row) {
-    const double ss = s.square().sum(), cc = c.square().sum(), sc = (s * c).sum();
-    const double det = ss * cc - sc * sc;
-    if (det > 1e-9 * ss * cc)
-      for (Eigen::Index i = 0; i < z.cols(); ++i) {
-        const double zs = (z.col(i) * s).sum(), zc = (z.col(i) * c).sum();
-        power(row, i) = (zs * zs * cc - 2 * zs * zc * sc + zc * zc * ss) / det;
-      }
-    was = s;
-    s = s * turn_c + c * turn_s;
-    c = c * turn_c - was * turn_s;
-  }
-  return power;
-}
 
 TrialValuesOf::TrialValuesOf(const Evidence& evidence, const Machine& machine,
                              const Column& residual, double least_gain)
@@ -162,8 +144,7 @@ std::vector<double> TrialValuesOf::find_wavelengths(std::size_t axis, const Colu
     if ((is_reading(channel.kind) || channel.axis == axis) && !residual[c].empty())
       channels.push_back(c);
   }
-  const double share = share_of_samples(record);
-  const std::vector<std::size_t> samples = fitted_samples(*evidence_, share);
+  const std::vector<std::size_t> samples = fitted_samples(*evidence_);
   const auto count = static_cast<Eigen::Index>(samples.size());
   Eigen::ArrayXd position(count);
   Eigen::ArrayXXd z(count, static_cast<Eigen::Index>(channels.size()));
@@ -173,10 +154,11 @@ std::vector<double> TrialValuesOf::find_wavelengths(std::size_t axis, const Colu
     for (Eigen::Index c = 0; c < z.cols(); ++c)
       z(i, c) = static_cast<double>(residual[channels[static_cast<std::size_t>(c)]][k]);
   }
-  const Eigen::ArrayXXd power = line_powers(position, z, travel, kWaves);
+  const Eigen::Index most = most_waves(command->value, samples, travel);
+  const Eigen::ArrayXXd power = line_spectrum(position, z, travel, most);
 
   std::vector<double> best;
-  for (const Line& line : lines_of(power, share * least_gain)) {
+  for (const Line& line : lines_of(power, even_waves(most), least_gain)) {
     const bool known = std::any_of(best.begin(), best.end(), [&](double w) {
       return std::abs(travel / w - line.waves) < kSameWaves;
     });

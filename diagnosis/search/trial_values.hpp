@@ -1,7 +1,7 @@
 // Which shapes of a candidate are worth trying on a record.
 //
-//   wavelength of an axis effect   lines of the residual over the axis' position: least squares of
-//                                  sine and cosine at every trial wavelength (Lomb 1976), the
+//   wavelength of an axis effect   lines of the residual over the axis' position down to 1/2000 of
+//                                  the travel, or to four samples (line_spectrum.hpp), the
 //                                  strongest three that are worth it; those of effects that were
 //                                  found; and the typical one
 //   frequency                      lines that do not repeat (noise audit), those of the residual
@@ -13,7 +13,6 @@
 //   exponent, edge, ...            the typical value, an exponent also above 1
 #pragma once
 
-#include <Eigen/Dense>
 #include <vector>
 
 #include "diagnosis/search/evidence.hpp"
@@ -51,18 +50,5 @@ class TrialValuesOf {
   double jump_ = 0;                               ///< [s]
   std::vector<double> ringing_;                   ///< [Hz]
 };
-
-/// Numbers of waves per length: `first`, `first + apart`, ...
-struct WaveGrid {
-  double first = 1, apart = 1;
-  Eigen::Index count = 1;
-
-  double waves(Eigen::Index i) const { return first + apart * static_cast<double>(i); }
-};
-
-/// Power that sine and cosine over `position` explain of each column of `z`, in squares of z: a row
-/// per number of waves in `length`.
-Eigen::ArrayXXd line_powers(const Eigen::ArrayXd& position, const Eigen::ArrayXXd& z, double length,
-                            const WaveGrid& grid);
 
 }  // namespace vcnc

@@ -72,6 +72,20 @@ TEST(Selection, FindsPeriodAndPhaseOfAWave) {
   EXPECT_NEAR(number_of(found, "effects.X.pitch_periodic.phase_deg"), 130, 5);
 }
 
+/// As slots of a motor make, some 300 waves in the travel.
+TEST(Selection, FindsAWaveThatIsShort) {
+  Record record = toy::commands(4000, 4);
+  const Machine truth = toy::machine({{"effects.X.pitch_periodic.amplitude_um", 0.2},
+                                      {"effects.X.pitch_periodic.period_mm", 0.2341},
+                                      {"effects.X.pitch_periodic.phase_deg", 130}});
+  toy::measure(record, truth, 3);
+  const SelectionResult result = search(record, Machine());
+  ASSERT_EQ(names(result, toy::candidates()), "X.pitch_periodic");
+  const Machine& found = result.found.machine;
+  EXPECT_NEAR(number_of(found, "effects.X.pitch_periodic.amplitude_um"), 0.2, 0.01);
+  EXPECT_NEAR(number_of(found, "effects.X.pitch_periodic.period_mm"), 0.2341, 1e-4);
+}
+
 TEST(Selection, FindsAWaveThatALargeEffectHid) {
   // An ellipse over the position of X has lines that are all stronger than that of the wave.
   Record record = toy::commands(1000, 4);
