@@ -190,6 +190,29 @@ void tell_form_of_fitted(const std::vector<double>& left,
     }
 }
 
+/// Axes that move, and stood in the healthy run that the model was fitted to.
+void tell_not_fitted(const Machine& declared, const Record& record,
+                     const std::vector<ComparedChannel>& channels, Diagnosis& d) {
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    bool compared = false, fitted = false;
+    for (const ComparedChannel& c : channels) {
+      if (is_reading(c.kind) || c.axis != axis) continue;
+      compared = true;
+      fitted = fitted || std::any_of(declared.commissioned.begin(), declared.commissioned.end(),
+                                     [&](const CommissionedSignal& s) {
+                                       return s.signal == channel_name(c);
+                                     });
+    }
+    if (compared && !fitted && moves(record, axis))
+      d.warnings.push_back(fmt::format(
+          "{0} moves here and did not in the healthy run that the model was fitted to: of its "
+          "friction, waves and gains the model knows what was declared, so what is told of {0} may "
+          "be what it always had. Commission with a run that moves it, or give a healthy run of "
+          "this program as --reference.",
+          kAxisNames[axis]));
+  }
+}
+
 /// Stopped while laws are sought, too: then without them.
 Diagnosis findings_of_search(const DiagnosisCase& of, Attempt& search, bool differential,
                              const KeepGoing& keep_going) {
@@ -259,7 +282,10 @@ Diagnosis explained(const DiagnosisCase& of, const Record& raw,
     d.notes.push_back(
         "What was found lets the encoders make more noise than in the declared machine; all was "
         "sought once more with that noise.");
-  if (!question.left.empty()) tell_form_of_fitted(question.left, of.replica.channels(), d);
+  if (!question.left.empty()) {
+    tell_form_of_fitted(question.left, of.replica.channels(), d);
+    tell_not_fitted(declared, raw, of.replica.channels(), d);
+  }
   return d;
 }
 

@@ -99,6 +99,9 @@ struct Record {
   }
 };
 
+/// Whether an axis is told to move, or moves where nothing is told.
+bool moves(const Record& record, std::size_t axis);
+
 inline constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace vcnc

@@ -689,6 +689,21 @@ TEST(Diagnose, WhatCommissioningLeftNeedsNoCause) {
   EXPECT_THROW(diagnosed(well, fitted), InputError);
 }
 
+TEST(Diagnose, AnAxisThatStoodWhenTheModelWasFittedIsToldOf) {
+  const Record record = measured({}, 45);
+  const auto warned = [&](const std::vector<CommissionedSignal>& commissioned) {
+    Machine fitted;
+    fitted.commissioned = commissioned;
+    const std::vector<std::string> all = diagnosed(record, fitted).warnings;
+    return std::count_if(all.begin(), all.end(), [](const std::string& w) {
+      return w.find("did not in the healthy run that the model was fitted to") != std::string::npos;
+    });
+  };
+  EXPECT_EQ(warned({}), 0);  // a file of no commissioning
+  EXPECT_EQ(warned({{"force X", 0}}), 0);
+  EXPECT_EQ(warned({{"deflection x", 1e-9}, {"force Y", 1}}), 1);  // of X; Y is not compared
+}
+
 TEST(Diagnose, WhereThePieceWasClampedIsToldAndIsNoFaultOfTheMachine) {
   Machine clamped;
   move_number(clamped, "effects.setup.piece_offset.shift_um.x", 40);

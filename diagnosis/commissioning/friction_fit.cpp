@@ -1,0 +1,135 @@
+#include "diagnosis/commissioning/friction_fit.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "diagnosis/search/refit.hpp"
+
+namespace vcnc {
+namespace {
+
+/// What friction of the motor's side must explain of what is left.
+constexpr double kShareOfSide = 0.02;
+
+/// Effects of an axis that are fitted together.
+struct FrictionLaw {
+  std::string name;
+  std::vector<std::string> effects;
+};
+
+/// The simplest that does best is taken.
+const std::vector<FrictionLaw> kFrictionLaws{
+    {"dry and viscous friction", {"coulomb", "viscous"}},
+    {"dry, viscous and break-away friction", {"coulomb", "viscous", "stribeck"}},
+    {"dry and viscous friction with pre-sliding", {"coulomb", "viscous", "presliding"}},
+    {"dry, viscous and break-away friction with pre-sliding",
+     {"coulomb", "viscous", "stribeck", "presliding"}}};
+
+/// Whether a fit has left numbers where it began: what was gained is not theirs.
+bool nothing_moved(const std::vector<FreedNumber>& begun, const std::vector<FreedNumber>& now) {
+  return std::equal(begun.begin(), begun.end(), now.begin(), now.end(),
+                    [](const FreedNumber& a, const FreedNumber& b) { return a.value == b.value; });
+}
+
+}  // namespace
+
+FrictionFit::FrictionFit(MachineInFit& machine, std::string place)
+    : machine_(machine), place_(std::move(place)), before_(machine.now) {}
+
+void FrictionFit::fit() {
+  auto [best, law] = with_law({});
+  if (!law.empty()) machine_.accept(std::move(best), place_, law);
+}
+
+void FrictionFit::fit_anew(const std::vector<std::size_t>& since) {
+  const std::vector<std::string>& of_law = kFrictionLaws.back().effects;
+  LinearPart& along = before_.nuisances;
+  for (std::size_t i = 0; i < machine_.now.nuisances.numbers.size(); ++i) {
+    const FreedNumber& n = machine_.now.nuisances.numbers[i];
+    if (has_key(along.numbers, n.number.key) ||
+        std::find(of_law.begin(), of_law.end(), effect_of_key(n.number.key)) != of_law.end())
+      continue;
+    along.numbers.push_back(n);
+    along.columns.push_back(machine_.now.nuisances.columns[i]);
+  }
+  Machine& machine = before_.machine;
+  for (const std::size_t c : since)
+    for (const FreeNumber& n : machine_.candidates[c].numbers)
+      move_number(machine, n.key, number_of(machine_.now.machine, n.key));
+  machine = with(machine, along.numbers);
+  auto [best, law] = with_law({});
+  if (!law.empty() && machine_.gains_enough(machine_.now, best, place_))
+    machine_.accept(std::move(best), place_, law + " anew");
+}
+
+/// The axis as it was before its friction was fitted, with the law that does best and with what
+/// is fitted beside it; without a name where none does anything.
+std::pair<FittedMachine, std::string> FrictionFit::with_law(
+    const std::vector<std::size_t>& beside) const {
+  const FittedMachine& from = before_;
+  std::vector<FittedMachine> trials(kFrictionLaws.size(), from);
+  machine_.evidence.each_together(trials.size(), [&](std::size_t i) {
+    std::vector<std::size_t> law = machine_.the(kFrictionLaws[i].effects, place_);
+    if (law.empty()) return;
+    law.insert(law.end(), beside.begin(), beside.end());
+    const FittedMachine begun = machine_.with_candidates(from, law);
+    trials[i] = begun;
+    converge(machine_.evidence, trials[i]);
+    if (nothing_moved(begun.numbers(), trials[i].numbers())) trials[i] = from;
+  });
+  const FittedMachine* best = &from;
+  for (const FittedMachine& trial : trials)
+    if (machine_.gains_enough(*best, trial, place_)) best = &trial;
+  if (best == &from) return {};
+  const auto law = static_cast<std::size_t>(best - trials.data());
+  return {std::move(trials[law]), kFrictionLaws[law].name};
+}
+
+void FrictionFit::fit_with(std::size_t gain) {
+  if (!machine_.candidates[gain].of_loops) return;
+  auto [better, law] = with_law({gain});
+  if (law.empty() || !machine_.gains_enough(machine_.now, better, place_, kShareOfLeft) ||
+      machine_.is_as_declared(better) || machine_.stands_for_force(better))
+    return;
+  machine_.accept(std::move(better), place_, law + " with " + told(machine_.candidates[gain]));
+}
+
+void FrictionFit::fit_part_of_motor() {
+  const std::vector<std::size_t> motor = machine_.the({"motor_friction"}, place_);
+  if (motor.empty()) return;
+  // It does little that friction of the load does not, so no way leads there from none of it.
+  constexpr std::array kShares{0.1, 0.35};
+  std::vector<FittedMachine> better(kShares.size());
+  machine_.evidence.each_together(better.size(), [&](std::size_t i) {
+    better[i] = machine_.with_candidates(machine_.now, motor);
+    move_to_motor(better[i], kShares[i]);
+    converge(machine_.evidence, better[i]);
+  });
+  const auto best = std::min_element(
+      better.begin(), better.end(),
+      [](const FittedMachine& a, const FittedMachine& b) { return a.held_out < b.held_out; });
+  if (machine_.gains_enough(machine_.now, *best, place_, kShareOfSide))
+    machine_.accept(std::move(*best), place_, "part of its friction on the motor's side");
+}
+
+/// A share of the dry and viscous friction of the load, on bristles of a usual stiffness.
+void FrictionFit::move_to_motor(FittedMachine& m, double share) const {
+  const std::string of_axis = "effects." + place_ + ".";
+  for (const auto& [from, to] : {std::pair{"coulomb.level", "motor_friction.level"},
+                                 std::pair{"viscous.coefficient", "motor_friction.viscous"}}) {
+    double moved = 0;
+    for (AddedEffect& a : m.added)
+      for (FreedNumber& n : a.numbers) {
+        if (n.number.key.starts_with(of_axis + from)) {
+          moved = share * n.value;
+          n.value -= moved;
+        }
+        if (n.number.key.starts_with(of_axis + to)) n.value = moved;
+        if (n.number.key.starts_with(of_axis + "motor_friction.stiffness") && n.value == 0)
+          n.value = n.number.typical;
+      }
+  }
+  m.machine = with(std::move(m.machine), m.numbers());
+}
+
+}  // namespace vcnc
