@@ -190,7 +190,7 @@ int compare_models(const DiagnoseOptions& options, const Record& record, const M
 bool is_unrecorded_axis(const std::string& place, const Record& record) {
   for (const MeasuredSignal& s : record.signals)
     if (is_reading(s.kind) || place == kAxisNames[s.axis]) return false;
-  return std::find(kAxisNames.begin(), kAxisNames.end(), place) != kAxisNames.end();
+  return axis_named(place) < kAxisCount;
 }
 
 /// Of an axis that is not recorded nothing can be held against the record.

@@ -24,10 +24,8 @@ int drive(int argc, char** argv) {
       return std::string(node.locked() ? "the spindle is locked" : "the spindle is not locked");
     });
   }
-  const auto axis =
-      std::find(kAxisNames.begin(), kAxisNames.end(), options.axis) - kAxisNames.begin();
   const auto truth = open_truth_writer(options.truth);
-  DriveNode node(static_cast<std::size_t>(axis), machine, options.seed, *truth);
+  DriveNode node(axis_named(options.axis), machine, options.seed, *truth);
   return serve(node, options);
 }
 

@@ -45,8 +45,7 @@ void write_program(const std::string& kind, Arguments a) {
   const Machine machine = load_machine(a.machine, a.assignments);
   a.ProgramOptions::direction = a.direction == "cw" ? ProgramOptions::Direction::clockwise
                                                     : ProgramOptions::Direction::counter_clockwise;
-  a.ProgramOptions::axis = static_cast<std::size_t>(
-      std::find(kAxisNames.begin(), kAxisNames.end(), a.axis) - kAxisNames.begin());
+  a.ProgramOptions::axis = axis_named(a.axis);
   std::string text;
   try {
     text = program_text(kind, machine, a);

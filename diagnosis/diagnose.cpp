@@ -8,7 +8,7 @@
 #include <mutex>
 #include <optional>
 
-#include "diagnosis/findings.hpp"
+#include "diagnosis/findings/findings.hpp"
 #include "diagnosis/records/signal_name.hpp"
 #include "diagnosis/replica/clipped_replica.hpp"
 #include "diagnosis/replica/model_comparison.hpp"

@@ -11,6 +11,13 @@ inline constexpr std::size_t kAxisCount = 5;
 inline constexpr std::array<std::string_view, kAxisCount> kAxisNames{"X", "Y", "Z", "A", "C"};
 enum Axis : std::size_t { kX = 0, kY = 1, kZ = 2, kA = 3, kC = 4 };
 
+/// kAxisCount: none has that name.
+constexpr std::size_t axis_named(std::string_view name) {
+  std::size_t axis = 0;
+  while (axis < kAxisCount && kAxisNames[axis] != name) ++axis;
+  return axis;
+}
+
 /// X, Y, Z are linear (SI unit m); A, C are rotary (SI unit rad).
 constexpr bool is_rotary(std::size_t axis) { return axis >= kA; }
 

@@ -104,8 +104,7 @@ bool MachineInFit::stands_out(const std::string& place) const {
 
 /// Of an axis its own signals and the readings, else all.
 double MachineInFit::above_noise(const FittedMachine& m, const std::string& place) const {
-  const auto axis = static_cast<std::size_t>(
-      std::find(kAxisNames.begin(), kAxisNames.end(), place) - kAxisNames.begin());
+  const std::size_t axis = axis_named(place);
   const std::vector<double> chi2 = evidence.chi2_of(m.residual, Role::held_out);
   double above = 0;
   for (std::size_t c = 0; c < chi2.size(); ++c) {
@@ -160,9 +159,8 @@ bool MachineInFit::stands_for_force(const FittedMachine& m) const {
   Machine without = m.machine;
   for (const FreeNumber& n : last.numbers)
     move_number(without, n.key, number_of(of.declared, n.key));
-  const auto axis = static_cast<std::size_t>(
-      std::find(kAxisNames.begin(), kAxisNames.end(), last.place) - kAxisNames.begin());
-  const auto b = controller_.of(axis, evidence.predict(without), evidence.predict(m.machine));
+  const auto b = controller_.of(axis_named(last.place), evidence.predict(without),
+                                evidence.predict(m.machine));
   return b && b->contradicts();
 }
 

@@ -57,4 +57,7 @@ std::vector<Candidate> candidates(const Machine& declared);
 /// controllers know what is declared, its bodies are as `machine` says.
 Machine as_hypothesis(const Machine& declared, const Machine& machine);
 
+/// What the library says of an effect; null: it has none of that name.
+const EffectText* effect_text(const std::string& effect);
+
 }  // namespace vcnc

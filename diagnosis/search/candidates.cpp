@@ -118,8 +118,7 @@ namespace {
 /// A zone lies within the travel of its axis and takes half of it at most: a wider one is friction
 /// as such. A spring rests half a travel beyond it at most: else it is a weight.
 void keep_within_travel(const Machine& declared, Candidate& of_axis) {
-  const auto axis = static_cast<std::size_t>(
-      std::find(kAxisNames.begin(), kAxisNames.end(), of_axis.place) - kAxisNames.begin());
+  const std::size_t axis = axis_named(of_axis.place);
   const double unit = is_rotary(axis) ? unit::deg.to_si : unit::mm.to_si;
   const double low = declared.axes[axis].limits.min / unit,
                high = declared.axes[axis].limits.max / unit;
@@ -182,6 +181,14 @@ Machine as_hypothesis(const Machine& declared, const Machine& machine) {
     if (!already) known.push_back({before[i].key, after[i].in_unit()});
   }
   return hypothesis;
+}
+
+const EffectText* effect_text(const std::string& effect) {
+  const EffectText* text = nullptr;
+  for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
+    if (Effect::text.name == effect) text = &Effect::text;
+  });
+  return text;
 }
 
 }  // namespace vcnc

@@ -23,7 +23,6 @@ constexpr double kHopeless = 100;      ///< times what is to be explained: a loo
 constexpr int kGlance = 4;             ///< iterations to see what a candidate is worth
 constexpr double kUsual = 1;           ///< decades about the typical size, or of tolerances
 constexpr double kUsualShape = 2;      ///< decades about the typical period, speed or time
-constexpr double kShows = 0.02;        ///< part of a gain that a channel must have to be concerned
 constexpr double kChance = 3;          ///< standard deviations of a sum of squares
 constexpr double kOfTolerances = 0.3;  ///< numbers, for a decade of tolerances more
 constexpr double kMoreUsual = 0.2;     ///< numbers: a declared one by 50 tolerances
@@ -55,7 +54,7 @@ std::vector<std::size_t> shown_in(const std::vector<double>& before,
   for (std::size_t c = 0; c < before.size(); ++c) gain += std::max(0.0, before[c] - after[c]);
   std::vector<std::size_t> channels;
   for (std::size_t c = 0; c < before.size(); ++c)
-    if (before[c] - after[c] > kShows * gain) channels.push_back(c);
+    if (before[c] - after[c] > kConcerned * gain) channels.push_back(c);
   return channels;
 }
 

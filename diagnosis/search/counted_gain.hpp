@@ -16,6 +16,9 @@
 
 namespace vcnc {
 
+/// Part of a gain that a channel must have to be concerned.
+inline constexpr double kConcerned = 0.02;
+
 /// Chi-square of the held-out laps per channel that does not count; empty: all counts.
 using Doubt = std::vector<double>;
 

@@ -22,8 +22,6 @@ Eigen::MatrixXd information_of(const Ground& ground) {
   return a;
 }
 
-constexpr double kShows = 0.02;  ///< part of a gain that a channel must have to be concerned
-
 /// Steps at which one consequence at least is what is needed.
 double steps_to_reach(const Consequence& needed, const Consequence& per_step) {
   return std::min(needed.contour_um / per_step.contour_um,
@@ -103,7 +101,7 @@ double DetectionLimits::steps_to(const std::vector<double>& per_step,
   double all = 0, left = 0;
   for (const double p : per_step) all += std::max(0.0, p);
   for (std::size_t c = 0; c < per_step.size(); ++c)
-    if (per_step[c] > kShows * all) left += std::max(0.0, of(needed_.left, c));
+    if (per_step[c] > kConcerned * all) left += std::max(0.0, of(needed_.left, c));
   const double least = std::max(needed_.counted_gain, needed_.share / (1 - needed_.share) * left);
   const auto counts = [&](double squared) {
     double sum = 0;

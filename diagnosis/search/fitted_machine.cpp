@@ -141,9 +141,7 @@ void stay(const Evidence& evidence, FittedMachine& m) {
   m.held_out = Ground(evidence, m.residual, m.linear()).held_out;
 }
 
-bool is_axis(const std::string& place) {
-  return std::find(kAxisNames.begin(), kAxisNames.end(), place) != kAxisNames.end();
-}
+bool is_axis(const std::string& place) { return axis_named(place) < kAxisCount; }
 
 /// Declared numbers whose sensitivities are others than those of the declared machine: not those of
 /// a drive at which nothing was found.

@@ -110,10 +110,8 @@ std::vector<TrialColumns> TrialPool::simulated_with(const FittedMachine& m,
 }
 
 bool TrialPool::asleep(const Candidate& c) const {
-  const auto name = std::find(kAxisNames.begin(), kAxisNames.end(), c.place);
-  if (name == kAxisNames.end()) return false;
-  if (!is_of_drive(c)) return false;
-  const auto axis = static_cast<std::size_t>(name - kAxisNames.begin());
+  const std::size_t axis = axis_named(c.place);
+  if (axis == kAxisCount || !is_of_drive(c)) return false;
   if (std::count(rules_.options.vibrating.begin(), rules_.options.vibrating.end(), axis) > 0)
     return true;
   const MeasuredSignal* command = rules_.evidence.record().find(SignalKind::command, axis);

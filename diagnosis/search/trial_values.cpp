@@ -17,13 +17,6 @@ bool contains(const std::string& text, const char* part) {
   return text.find(part) != std::string::npos;
 }
 
-/// Axis whose letter is the place of a candidate; kAxisCount: none.
-std::size_t axis_of(const Candidate& c) {
-  for (std::size_t i = 0; i < kAxisCount; ++i)
-    if (c.place == kAxisNames[i]) return i;
-  return kAxisCount;
-}
-
 /// Over the position of an axis, where its key has a unit of that.
 bool is_wavelength(const FreeNumber& n) {
   return contains(n.key, ".period_") || contains(n.key, "pitch_") ||
@@ -119,7 +112,7 @@ void TrialValuesOf::follow(const TrialValuesOf& known) {
 }
 
 void TrialValuesOf::add_found(const Candidate& candidate, const std::vector<FreedNumber>& numbers) {
-  const std::size_t axis = axis_of(candidate);
+  const std::size_t axis = axis_named(candidate.place);
   if (axis == kAxisCount) return;
   for (const FreedNumber& n : numbers) {
     if (!n.shape || !is_wavelength(n.number)) continue;
@@ -246,7 +239,7 @@ std::vector<double> TrialValuesOf::find_ringing(const Column& residual) const {
 std::vector<double> TrialValuesOf::operator()(const Candidate& candidate,
                                               std::size_t number) const {
   const FreeNumber& n = candidate.numbers[number];
-  const std::size_t axis = axis_of(candidate);
+  const std::size_t axis = axis_named(candidate.place);
   std::vector<double> values{n.typical};
   const auto more = [&](const std::vector<double>& further) {
     values.insert(values.end(), further.begin(), further.end());

@@ -9,7 +9,7 @@
 
 #include "configs/config.hpp"
 #include "diagnosis/commission.hpp"
-#include "diagnosis/findings.hpp"
+#include "diagnosis/findings/findings.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
 #include "diagnosis/search/period_slip_search.hpp"

@@ -1,4 +1,4 @@
-#include "diagnosis/record_notes.hpp"
+#include "diagnosis/findings/record_notes.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "diagnosis/findings.hpp"
+#include "diagnosis/findings/findings.hpp"
 
 #include <fmt/format.h>
 
@@ -6,12 +6,15 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <set>
 #include <utility>
 
-#include "diagnosis/record_notes.hpp"
+#include "diagnosis/findings/excitation.hpp"
+#include "diagnosis/findings/record_notes.hpp"
+#include "diagnosis/findings/still_off.hpp"
+#include "diagnosis/findings/vibrations.hpp"
 #include "diagnosis/replica/model_comparison.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
+#include "diagnosis/search/candidate.hpp"
 #include "diagnosis/search/common_numbers.hpp"
 #include "diagnosis/search/consequence.hpp"
 #include "diagnosis/search/freed_number.hpp"
@@ -19,55 +22,20 @@
 #include "diagnosis/search/law_search.hpp"
 #include "diagnosis/search/refit.hpp"
 #include "diagnosis/search/screening.hpp"
-#include "diagnosis/search/trial.hpp"
 #include "diagnosis/verdict.hpp"
 #include "model/axes.hpp"
-#include "model/effects/list.hpp"
 
 namespace vcnc {
 namespace {
 
-/// Times the noise by which a signal is off for something that is there, and part of what it was
-/// off by before that a model of what was found may be wrong by.
-constexpr double kLoud = 1.5, kWrongOfFound = 0.05;
 /// Of an amplitude, what is uncertain of it with its shape known, where the shape is all the rest.
 constexpr double kKnownTogether = 0.2;
 /// Times the noise of a sample by which readings may shift from lap to lap.
 constexpr double kShifted = 3;
 /// Times what is declared that no declared number is.
 constexpr double kUnlikelyTimes = 4;
-const EffectText* text_of(const std::string& effect) {
-  const EffectText* text = nullptr;
-  for_each_effect([&]<class Effect>(std::type_identity<Effect>) {
-    if (Effect::text.name == effect) text = &Effect::text;
-  });
-  return text;
-}
-
-/// The kind of `vcnc program` that shows an effect best.
-std::string program_for(const std::string& effect) {
-  const EffectText* text = text_of(effect);
-  if (!text) return "";
-  switch (text->showing) {
-    case Showing::circle:
-    case Showing::circle_feeds:
-      return "circle";
-    case Showing::line:
-    case Showing::reversals:
-    case Showing::spin:
-      return "diagnosis";
-    case Showing::standstill:
-    case Showing::corner:
-      return "step";
-    case Showing::s_piece:
-      return "s-piece";
-  }
-  return "";
-}
-
-/// "effects.X.scale_error.error_ppm": ("X", "scale_error").
 bool of_measurement(const std::string& effect) {
-  const EffectText* text = text_of(effect);
+  const EffectText* text = effect_text(effect);
   return text && (text->family == Family::probe || text->family == Family::acquisition ||
                   text->family == Family::setup);
 }
@@ -107,13 +75,15 @@ class Report {
     // Without a law, numbers were pulled for want of it.
     if (d_.laws.empty()) add(d_.notes, pulled_);
     tell_still_off(off);
-    tell_chatter();
+    tell_vibrations(of_, evidence_, before_.chatter, d_);
     tell_shifts_between_laps();
     std::stable_sort(d_.effects.begin(), d_.effects.end(), [](const auto& a, const auto& b) {
       return a.contour_error_um > b.contour_error_um;
     });
     flag_minor();
-    tell_excitation();
+    ExcitationOfRun excitation = excitation_of(of_, evidence_, selection_);
+    d_.excitation = std::move(excitation.of);
+    add(d_.notes, excitation.notes);
     tell_figures();
     tell_ladder();
     judge();
@@ -375,69 +345,6 @@ class Report {
            evidence_.chi2(found().residual, Role::held_out);
   }
 
-  /// What vibrates by itself, and with which effects the model does so, too.
-  void tell_chatter() {
-    for (const Chatter& chatter : before_.chatter) {
-      const std::string_view axis = kAxisNames[chatter.axis];
-      if (chatter.of_model) {
-        d_.notes.push_back(fmt::format(
-            "The declared machine lets {} vibrate by itself ({}), the measured one does "
-            "not: what is declared of that drive is not what there is, and it was not "
-            "compared.",
-            axis, vibration(chatter.line)));
-        d_.vibrations.push_back(fmt::format(
-            "{} vibrates by itself in the declared machine and not in the measured one", axis));
-        continue;
-      }
-      std::string text =
-          chatter.has_line()
-              ? fmt::format("{} vibrates by itself: {}", axis, vibration(chatter.line))
-              : fmt::format("{} is restless: {}, {:.0f} times as much as in the healthy run", axis,
-                            trembling(chatter.unrest), chatter.times);
-      if (chatter.causes.empty() || !chatter.causes.front().as_strong) {
-        std::string likely;
-        for (const ChatterCause& c : chatter.causes)
-          likely += (likely.empty() ? " So does the model, but not with that strength, with "
-                                    : " or with ") +
-                    of_.candidates[c.candidate].name();
-        if (chatter.too_many > 0)
-          likely = fmt::format(
-              " So is the model with any of {} effects: it tells nothing of the "
-              "cause",
-              chatter.too_many);
-        else if (likely.empty())
-          likely = fmt::format(" No effect on the drive of {} does so", axis);
-        d_.notes.push_back(text + "." + likely + ".");
-        d_.vibrations.push_back(
-            chatter.has_line()
-                ? fmt::format("{} vibrates by itself at {:.0f} Hz", axis, chatter.line.frequency)
-                : fmt::format("{} is restless", axis));
-        continue;
-      }
-      const ChatterCause& cause = chatter.causes.front();
-      const Candidate& candidate = of_.candidates[cause.candidate];
-      d_.notes.push_back(fmt::format(
-          "{}. So does the model with {}: {}. Such a vibration has no phase that repeats, so that "
-          "amplitudes were compared and not samples; what else the drive of {} does was not "
-          "sought.",
-          text, candidate.name(),
-          chatter.has_line() ? vibration(cause.line) : trembling(cause.unrest), axis));
-      FoundEffect e;
-      e.name = candidate.effect;
-      e.place = candidate.place;
-      e.gain = std::numeric_limits<double>::quiet_NaN();
-      for (std::size_t i = 1; i < chatter.causes.size(); ++i)
-        e.class_with.push_back(of_.candidates[chatter.causes[i].candidate].name());
-      if (!e.class_with.empty()) e.separating_program = program_for(e.name);
-      const Prediction still = evidence_.predict(d_.found);
-      d_.found = with_candidate(d_.found, candidate, cause.size);
-      const std::string& key = candidate.numbers.front().key;
-      e.numbers = {{key, number_of(d_.found, key), cause.low, cause.high}};
-      e.contour_error_um = consequence(evidence_, evidence_.predict(d_.found), still).contour_um;
-      d_.effects.push_back(std::move(e));
-    }
-  }
-
   /// What a number does to the contour by standing where it stands.
   double moved_by(const FreedNumber& n) const {
     Machine without = found().machine;
@@ -515,16 +422,6 @@ class Report {
       e.minor = e.contour_error_um < 0.02 * largest && e.contour_error_um < 0.5;
   }
 
-  /// Chi-square beyond the noise that recorded steps may make of every signal.
-  std::vector<double> made_by_steps() const {
-    const Column& residual = selection_.base.residual;
-    const std::vector<double> left = evidence_.chi2_of(residual, Role::held_out),
-                              floor = noise_floor(evidence_, residual, options_.form_of_channel);
-    std::vector<double> made = evidence_.made_by_steps(selection_.base.prediction);
-    for (std::size_t c = 0; c < made.size(); ++c) made[c] = std::min(made[c], left[c] - floor[c]);
-    return made;
-  }
-
   void tell_steps(const std::vector<double>& made) {
     for (std::size_t c = 0; c < made.size(); ++c) {
       if (made[c] <= kFloorScatter * evidence_.count(c, Role::held_out)) continue;
@@ -537,58 +434,13 @@ class Report {
     }
   }
 
-  /// Whether an axis that vibrates by itself moves a signal.
-  bool is_stirred(const ComparedChannel& channel) const {
-    return std::any_of(before_.chatter.begin(), before_.chatter.end(), [&](const Chatter& c) {
-      return is_reading(channel.kind) || channel.axis == c.axis;
-    });
-  }
-
-  /// A position of a linear axis, or where the tool is.
-  static bool is_length(const ComparedChannel& channel) {
-    return is_reading(channel.kind) ||
-           (channel.kind == SignalKind::position && !is_rotary(channel.axis));
-  }
-
-  /// RMS on held-out laps [SI].
-  struct StillOff {
-    ComparedChannel channel;
-    double is, noise, was;
-  };
-
-  /// Signals that are still off by more than noise, and by more of what they were off than a
-  /// model of something that was found may be wrong by, on fitted and on held-out laps: what one
-  /// lap does alone is no deviation. Of what an axis that vibrates by itself moves tell_chatter()
-  /// tells.
+  /// But for where the piece lies: that is no fault that a model of it could be wrong about.
   std::vector<StillOff> what_is_still_off() const {
-    std::vector<StillOff> off;
-    const Prediction found = evidence_.predict(d_.found);
-    // Where the piece lies is no fault that a model of it could be wrong about.
     Machine clamped = of_.declared;
-    for (const FreedNumber& n : this->found().nuisances.numbers)
+    for (const FreedNumber& n : found().nuisances.numbers)
       if (is_clamping(n.number.key))
         move_number(clamped, n.number.key, number_of(d_.found, n.number.key));
-    const std::vector<double> before = evidence_.rms_within_laps(evidence_.predict(clamped),
-                                                                 Role::held_out),
-                              after = evidence_.rms_within_laps(found, Role::held_out),
-                              fitted = evidence_.rms_within_laps(found, Role::fitted);
-    for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c) {
-      const double n = evidence_.count(c, Role::held_out);
-      if (n < kFewSamples || is_stirred(evidence_.replica().channels()[c])) continue;
-      const double form = c < options_.form_of_channel.size() ? options_.form_of_channel[c] / n : 0,
-                   noise = evidence_.reckoned_with(c) * std::sqrt(1 + form), was = before[c],
-                   is = after[c];
-      const auto beyond = [&](double rms) {
-        return std::sqrt(std::max(0.0, rms * rms - noise * noise));
-      };
-      const double loud = std::max(kLoud * noise, 0.5 * evidence_.step_of(c));
-      if (std::min(is, fitted[c]) < loud || beyond(is) < kWrongOfFound * beyond(was)) continue;
-      if (is_length(evidence_.replica().channels()[c]) &&
-          beyond(is) * 1e6 < options_.least_contour_um)
-        continue;
-      off.push_back({evidence_.replica().channels()[c], is, noise, was});
-    }
-    return off;
+    return signals_still_off(evidence_, options_, before_.chatter, clamped, d_.found);
   }
 
   void tell_still_off(const std::vector<StillOff>& off) {
@@ -624,94 +476,6 @@ class Report {
     if (held_out(less) < held_out(d_.found) + options_.least_gain) d_.found = std::move(less);
   }
 
-  /// Of candidates, from those of the trials: the smallest size that is seen; of limits the
-  /// largest.
-  std::map<std::size_t, double> limits_of_candidates(const std::vector<double>& of_trials) const {
-    std::map<std::size_t, double> limits;
-    for (std::size_t i = 0; i < of_trials.size(); ++i) {
-      const Trial& trial = selection_.trials[i].trial;
-      double& limit = limits.try_emplace(trial.candidate, of_trials[i]).first->second;
-      const bool largest = trial.directions.front().whole && std::isfinite(limit);
-      if (std::isfinite(of_trials[i]))
-        limit = largest ? std::max(limit, of_trials[i]) : std::min(limit, of_trials[i]);
-    }
-    return limits;
-  }
-
-  /// Of a candidate the number that its limits are of.
-  const FreeNumber& limited_number(std::size_t candidate) const {
-    const auto& all = selection_.trials;
-    const auto at = std::find_if(all.begin(), all.end(), [&](const TrialColumns& t) {
-      return t.trial.candidate == candidate;
-    });
-    return of_.candidates[candidate].numbers[at->trial.directions.front().number];
-  }
-
-  /// Whether a place is an axis of which the run holds no signal.
-  bool is_unseen_axis(const std::string& place) const {
-    const auto name = std::find(kAxisNames.begin(), kAxisNames.end(), place);
-    const auto axis = static_cast<std::size_t>(name - kAxisNames.begin());
-    const std::vector<MeasuredSignal>& signals = evidence_.record().signals;
-    return name != kAxisNames.end() &&
-           std::none_of(signals.begin(), signals.end(), [&](const MeasuredSignal& s) {
-             return !is_reading(s.kind) && s.axis == axis;
-           });
-  }
-
-  void tell_excitation() {
-    const auto& beside = selection_.beside_found;
-    std::vector<double> alone;
-    for (const TrialColumns& t : selection_.trials) alone.push_back(t.detection_limit);
-    const std::map<std::size_t, double> limits = limits_of_candidates(alone),
-                                        limits_beside =
-                                            beside ? limits_of_candidates(beside->of_trials)
-                                                   : std::map<std::size_t, double>{};
-    double finest = std::numeric_limits<double>::infinity();  // slip of a period that would show
-    for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
-      if (is_reading(evidence_.replica().channels()[c].kind))
-        finest = std::min(finest, 5 * std::sqrt(2.0) * evidence_.noise().channels[c].rms /
-                                      of_.declared.probe.signal_period);
-    if (finest < 1) d_.excitation.push_back({"probe.period_slip", finest, true, "", "", {}});
-    std::set<std::string> unseen;
-    for (const auto& [c, limit] : limits) {
-      const Candidate& candidate = of_.candidates[c];
-      if (is_unseen_axis(candidate.place)) {
-        unseen.insert(candidate.place);
-        continue;
-      }
-      const FreeNumber& number = limited_number(c);
-      double typical = std::abs(number.typical);
-      for (std::size_t i = 0; i < candidate.numbers.size() && typical == 0; ++i)
-        typical = std::abs(candidate.numbers[i].typical);
-      const bool excited = is_limit(number) ? std::isfinite(limit) : limit < typical;
-      Excitation e{candidate.name(), limit, excited, "", number.key, {}};
-      if (!e.excited) e.program = program_for(candidate.effect);
-      if (const auto found = limits_beside.find(c); found != limits_beside.end())
-        e.beside_found = found->second;
-      if (e.excited || !selection_.interrupted) d_.excitation.push_back(std::move(e));
-    }
-    for (std::size_t i = 0; i < selection_.release_limits.size(); ++i) {
-      const FreeNumber& n = selection_.base.nuisances.numbers[i].number;
-      if (is_clamping(n.key) || is_unseen_axis(place_of_key(n.key))) continue;
-      const std::string place = place_of_key(n.key), effect = effect_of_key(n.key);
-      const double limit = selection_.release_limits[i];
-      Excitation e{never_quite_absent(n.key) ? place + "." + effect : n.key,
-                   limit,
-                   std::isfinite(limit),
-                   "",
-                   n.key,
-                   {}};
-      if (!e.excited) e.program = program_for(effect);
-      if (beside) e.beside_found = beside->of_releases[i];
-      d_.excitation.push_back(std::move(e));
-    }
-    if (!unseen.empty())
-      d_.notes.push_back(fmt::format(
-          "The run holds no signal of {}, taken to stand where the model starts; what {} is not "
-          "listed with what this run could have shown.",
-          fmt::join(unseen, " and "), unseen.size() == 1 ? "that axis has" : "these axes have"));
-  }
-
   void tell_figures() {
     const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
     const Prediction before = evidence_.predict(of_.declared), after = evidence_.predict(d_.found);
@@ -724,7 +488,8 @@ class Report {
     const std::vector<std::string> worse = signals_made_worse(d_.figures);
     add(d_.warnings, worse);
     std::vector<SignalFigure> at_rest = d_.figures;
-    std::erase_if(at_rest, [&](const SignalFigure& f) { return is_stirred(f.channel); });
+    std::erase_if(at_rest,
+                  [&](const SignalFigure& f) { return is_stirred(before_.chatter, f.channel); });
     made_worse_ = !signals_made_worse(at_rest).empty();
   }
 
@@ -750,7 +515,7 @@ class Report {
     const bool named = std::any_of(d_.effects.begin(), d_.effects.end(), is_of_machine);
     double ratio = 1 + after / std::max(1.0, floor_);
     if (ratio >= kQuiet && !named && !still_off_ && d_.laws.empty() && d_.vibrations.empty()) {
-      const std::vector<double> made = made_by_steps();
+      const std::vector<double> made = made_by_steps(evidence_, options_, selection_.base);
       const double beyond = after - std::accumulate(made.begin(), made.end(), 0.0);
       if (beyond < (kQuiet - 1) * floor_) ratio = 1, tell_steps(made);
     }

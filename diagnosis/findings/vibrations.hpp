@@ -1,0 +1,18 @@
+// Axes that vibrate by themselves, told.
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/diagnosis_case.hpp"
+#include "diagnosis/report/diagnosis.hpp"
+#include "diagnosis/search/chatter_search.hpp"
+#include "diagnosis/search/evidence.hpp"
+
+namespace vcnc {
+
+/// What vibrates by itself, and with which effects the model does so, too: one that makes it as
+/// strong becomes an effect of the diagnosis, at the end of it; the rest are notes.
+void tell_vibrations(const DiagnosisCase& of, const Evidence& evidence,
+                     const std::vector<Chatter>& chatter, Diagnosis& d);
+
+}  // namespace vcnc
