@@ -154,17 +154,31 @@ Verdict windup(Work& w, std::size_t axis) {
   return spring(w, axis, w.effects(axis).get<Windup>().compliance);
 }
 
-Verdict scale(Work& w, std::size_t axis) {
-  const ScaleError& e = w.effects(axis).get<ScaleError>();
+/// Errors in proportion to the travel, each from a position of its own, add up to one.
+Verdict add_scale(Work& w, std::size_t axis, double error, double reference) {
   const AxisLimits& l = w.machine.axes[axis].limits;
   const double largest =
-      std::abs(e.error) * std::max(std::abs(l.max - e.reference), std::abs(l.min - e.reference));
+      std::abs(error) * std::max(std::abs(l.max - reference), std::abs(l.min - reference));
   if (largest < kTooLittle)
     return no(fmt::format("makes {} at the end of the travel, too little to count",
                           length(largest, is_rotary(axis))));
-  w.settings.axes[axis].scale = e.error;
-  w.settings.axes[axis].scale_reference = e.reference;
-  return by(fmt::format("scale {:.4g} um/m", e.error * 1e6));
+  AxisCompensation& a = w.settings.axes[axis];
+  const double scale = a.scale + error;
+  if (scale != 0) a.scale_reference = (a.scale * a.scale_reference + error * reference) / scale;
+  a.scale = scale;
+  return by(fmt::format("scale {:.4g} um/m", error * 1e6));
+}
+
+Verdict scale(Work& w, std::size_t axis) {
+  const ScaleError& e = w.effects(axis).get<ScaleError>();
+  return add_scale(w, axis, e.error, e.reference);
+}
+
+Verdict lead_error(Work& w, std::size_t axis) {
+  if (!w.motor_encoder(axis))
+    return no("the measuring system on the load sees it and the loop closes it");
+  return add_scale(w, axis, w.effects(axis).get<LeadError>().error,
+                   w.machine.axes[axis].limits.start);
 }
 
 Verdict pitch_progressive(Work& w, std::size_t axis) {
@@ -320,6 +334,7 @@ constexpr Answer kAnswers[]{
     {"lost_motion", lost_motion},
     {"windup", windup},
     {"scale_error", scale},
+    {"lead_error", lead_error},
     {"pitch_progressive", pitch_progressive},
     {"pitch_periodic", pitch_periodic},
     {"encoder_eccentricity", encoder_eccentricity},

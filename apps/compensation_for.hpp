@@ -7,7 +7,7 @@
 //
 //   backlash (motor encoder), load_play        backlash = gap
 //   lost_motion, windup (motor encoder)        backlash = 2 c F_c, the part that friction makes
-//   scale_error                                scale
+//   scale_error, lead_error (motor encoder)    scale
 //   pitch_progressive, encoder_eccentricity    a table over the travel or a turn
 //   pitch_periodic, load_encoder_error, transmission_error (motor encoder)
 //                                              a table over one period, 64 points

@@ -32,6 +32,7 @@ const std::vector<std::string> kGains{"kv_error",
                                       "integral_time_error",
                                       "command_delay",
                                       "position_lag_us",
+                                      "setpoint_lag_us",
                                       "velocity_lag_us",
                                       "feedforward_lag_us"};
 

@@ -87,6 +87,7 @@ struct ServoParams {
   double acceleration_ff = 1;      ///< 1 = full acceleration feed-forward
   double current_lag = 0;          ///< first-order lag of the force/torque [s]
   double position_lag = 0;         ///< first-order lag of the position loop [s], cascade only
+  double setpoint_lag = 0;         ///< of the set-point of the position loop [s], cascade only
   double velocity_lag = 0;         ///< of the filter of the measured velocity [s], cascade only
   double feedforward_lag = 0;      ///< of both feed-forwards [s], cascade only
   Feedback feedback = Feedback::load;
@@ -114,6 +115,9 @@ struct ServoParams {
     visit("position_lag_us", p.position_lag, unit::us, Range{0, 5000},
           "lag of the position loop of a cascade: half its cycle, and its computing time; "
           "feed-forward passes by it");
+    visit("setpoint_lag_us", p.setpoint_lag, unit::us, Range{0, 5000},
+          "lag of the set-point of a cascade's position loop, feed-forward passes by it: the "
+          "balancing filter, which waits for the velocity loop");
     visit("velocity_lag_us", p.velocity_lag, unit::us, Range{0, 5000},
           "lag of the filter of a cascade's measured velocity");
     visit("feedforward_lag_us", p.feedforward_lag, unit::us, Range{0, 5000},

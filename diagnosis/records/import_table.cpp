@@ -349,6 +349,7 @@ class Importer {
       twist.source = record_.signals[l].source + " - " + record_.signals[m].source;
       for (std::size_t i = 0; i < base_.samples; ++i)
         twist.value.push_back(record_.signals[l].value[i] - record_.signals[m].value[i]);
+      twist.relative = true;
       take_zero_off(twist);
       gone.insert(closed == m ? l : m);
       record_.signals.push_back(std::move(twist));

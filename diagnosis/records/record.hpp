@@ -66,6 +66,7 @@ struct MeasuredSignal {
   std::string source;         ///< its name where it came from, for messages
   std::vector<double> value;  ///< SI; NaN: missing
   double resolution = 0;      ///< step in which its values come, 0: none was found
+  bool relative = false;      ///< counted from somewhere: its mean tells nothing
 };
 
 /// A part of a record whose samples belong together.

@@ -36,6 +36,7 @@ bool write_signal(hid_t file, std::size_t i, const MeasuredSignal& s) {
   return set.ok() && write(set, "kind", std::string(to_string(s.kind))) &&
          write(set, "axis", static_cast<std::int64_t>(s.axis)) && write(set, "source", s.source) &&
          write(set, "resolution", s.resolution) &&
+         write(set, "relative", static_cast<std::int64_t>(s.relative)) &&
          H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, s.value.data()) >= 0;
 }
 
@@ -78,6 +79,8 @@ bool read_signal(hid_t file, std::size_t i, MeasuredSignal& s, std::uintmax_t fi
   if (!known || axis < 0 || axis >= static_cast<std::int64_t>(kAxisCount) ||
       samples > file_size / sizeof(double))
     return false;
+  std::int64_t relative = 0;  // older files do not have it
+  s.relative = read(set, "relative", relative) && relative != 0;
   s.kind = *known;
   s.axis = static_cast<std::size_t>(axis);
   s.value.resize(samples);

@@ -51,4 +51,13 @@ double mean_square_off_mean(const std::vector<double>& series, std::size_t reach
   return mean_square(off);
 }
 
+std::vector<double> with_mean_of(const std::vector<double>& other, std::vector<double> series) {
+  double sum = 0, n = 0;
+  for (std::size_t k = 0; k < std::min(other.size(), series.size()); ++k)
+    if (const double d = other[k] - series[k]; std::isfinite(d)) sum += d, n += 1;
+  if (n > 0)
+    for (double& x : series) x += sum / n;
+  return series;
+}
+
 }  // namespace vcnc

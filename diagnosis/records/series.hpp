@@ -19,6 +19,9 @@ std::vector<double> second_derivative(const std::vector<double>& series, double 
 /// Of what is known; 0: nothing is.
 double mean_square(const std::vector<double>& series);
 
+/// A series, moved to have the mean that another has where both are known.
+std::vector<double> with_mean_of(const std::vector<double>& other, std::vector<double> series);
+
 /// Mean square of what a series is off its moving mean.
 double mean_square_off_mean(const std::vector<double>& series, std::size_t reach);
 

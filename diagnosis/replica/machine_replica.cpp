@@ -195,6 +195,10 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
       late_velocity_[c.axis] = lateness_of_velocity(record, c.axis).value_or(0);
   probes_ = std::any_of(channels_.begin(), channels_.end(),
                         [](const ComparedChannel& c) { return is_reading(c.kind); });
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (const MeasuredSignal* twist = record.find(SignalKind::twist, axis);
+        twist && twist->relative)
+      relative_twist_[axis] = twist->value;
   known_ = motion.known;
   motion_ = at_cycles(motion, period_);
   for (std::size_t c = 0; c < measured_.size(); ++c)
@@ -342,6 +346,8 @@ void MachineReplica::sample_as_recorded(AxisReplay& replay, std::size_t axis) co
   if (const auto& late = late_velocity_[axis])
     replay.velocity = as_recorded(motor_velocity(replay, axis), *late);
   for (SharedSeries* s : {&replay.measured, &replay.twist, &replay.force}) *s = as_recorded(*s);
+  if (const auto& counted = relative_twist_[axis])
+    replay.twist = with_mean_of(*counted, replay.twist);
 }
 
 /// At every cycle, from the two beside it.

@@ -11,6 +11,8 @@
 // like is not seen then, and no position is compared. Records at another rate than the bus cycle
 // are brought to 1 ms by the spline of the commands and back by straight lines.
 //
+// Of a twist that is counted from anywhere the mean is taken from the record.
+//
 // The velocity of a motor is the slope of its position over two cycles, as late as the record has
 // it (late_velocity.hpp). It is compared where no position tells of the motor: that of the loop is
 // the load's, or there is none; else it would be the same encoder twice.
@@ -106,10 +108,11 @@ class MachineReplica : public Replica {
   std::size_t samples_;
   std::vector<ComparedChannel> channels_;
   PerAxis<std::optional<double>> late_velocity_;  ///< of those compared, after the position [s]
-  bool probes_ = false;                           ///< some channel is a reading
-  CommandedMotion motion_;                        ///< at 1 ms
-  std::vector<char> known_;                       ///< at the record's rate
-  Deflections measured_;                          ///< at 1 ms; empty where not recorded
+  PerAxis<std::optional<std::vector<double>>> relative_twist_;  ///< as measured
+  bool probes_ = false;                                         ///< some channel is a reading
+  CommandedMotion motion_;                                      ///< at 1 ms
+  std::vector<char> known_;                                     ///< at the record's rate
+  Deflections measured_;  ///< at 1 ms; empty where not recorded
   std::unique_ptr<Piece> piece_;
   Counterpart against_;
   Vec3 across_ = Vec3::Zero();  ///< unit normal of the plane that a bar stays in; zero: none

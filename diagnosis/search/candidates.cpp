@@ -6,6 +6,8 @@
 
 #include "diagnosis/replica/effect_stage.hpp"
 #include "diagnosis/search/candidate.hpp"
+#include "diagnosis/search/freed_number.hpp"
+#include "diagnosis/search/trial.hpp"
 #include "model/effects/numbers.hpp"
 #include "model/parameters.hpp"
 
@@ -89,6 +91,7 @@ bool can_be(const EffectPlace& place, const Machine& declared) {
     const MechanicsParams& m = declared.axes[place.axis].mechanics;
     return m.reflected_inertia() > kLeastMotorShare * m.load;
   }
+  if constexpr (std::is_same_v<Effect, LeadError>) return has_a_lead(declared, place.axis);
   if constexpr (std::is_same_v<Effect, MotorFriction>) {
     const AxisEffects& e = declared.effects.axis[place.axis];
     return !(e.get<Windup>().null() && e.get<Backlash>().null());  // else it is that of the load
@@ -116,21 +119,22 @@ Range range_with_a_motor_side(const Machine& declared, const std::string& key, R
 namespace {
 
 /// A zone lies within the travel of its axis and takes half of it at most: a wider one is friction
-/// as such. A spring rests half a travel beyond it at most: else it is a weight.
+/// as such. A spring rests within it: else it is a weight. A wave is twice as long at most, or a
+/// turn of a rotary axis and a little: a longer one is none.
 void keep_within_travel(const Machine& declared, Candidate& of_axis) {
+  constexpr double kTurn_deg = 400;
   const std::size_t axis = axis_named(of_axis.place);
+  if (axis == kAxisCount) return;
   const double unit = is_rotary(axis) ? unit::deg.to_si : unit::mm.to_si;
   const double low = declared.axes[axis].limits.min / unit,
-               high = declared.axes[axis].limits.max / unit;
+               high = declared.axes[axis].limits.max / unit, travel = high - low;
   for (FreeNumber& n : of_axis.numbers) {
-    if (n.key.find(".centre_") != std::string::npos) n.min = low, n.max = high;
-    if (n.key.find(".rest_") != std::string::npos) {
-      const double travel = high - low;
-      n.min = low - travel / 2, n.max = high + travel / 2;
-      n.typical = travel / 10;
-    }
+    if (is_place(n)) n.min = low, n.max = high;
+    if (n.key.find(".rest_") != std::string::npos) n.typical = travel / 10;
     if (n.key.find(".width_") != std::string::npos || n.key.find(".edge_") != std::string::npos)
-      n.max = std::min(n.max, (high - low) / 2);
+      n.max = std::min(n.max, travel / 2);
+    if (is_wavelength(n) && si_of_unit(n.key) == unit)
+      n.max = std::min(n.max, std::max(2 * travel, is_rotary(axis) ? kTurn_deg : 0));
   }
 }
 
@@ -162,9 +166,7 @@ std::vector<Candidate> candidates(const Machine& declared) {
     for (const EffectPlace& place : places_of(Effect::place))
       if (can_be<Effect>(place, declared)) add_candidate<Effect>(place, all);
   });
-  for (Candidate& c : all)
-    if (c.effect == FrictionZone::text.name || c.effect == CableChain::text.name)
-      keep_within_travel(declared, c);
+  for (Candidate& c : all) keep_within_travel(declared, c);
   add_deviations(declared, all);
   return all;
 }

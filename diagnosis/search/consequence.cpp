@@ -8,7 +8,8 @@
 namespace vcnc {
 namespace {
 
-constexpr double kArithmetic = 1e-9;  ///< of a contour, that rounding of numbers makes [um]
+constexpr double kFineNoise = 0.1e-6;  // [m]
+constexpr double kArithmetic = 1e-9;   ///< of a contour, that rounding of numbers makes [um]
 
 struct Difference {
   double sum = 0, n = 0;
@@ -112,7 +113,8 @@ Consequence consequence(const Evidence& evidence, const Prediction& a, const Pre
     }
     const double noise = evidence.noise().channels[c].rms;
     if (d.n == 0 || noise <= 0) continue;
-    const double share = std::sqrt(d.sum / d.n) / noise;
+    const bool length = kind == SignalKind::position && !is_rotary(axis);
+    const double share = std::sqrt(d.sum / d.n) / std::max(noise, length ? kFineNoise : 0);
     of.of_noise = std::max(of.of_noise, share);
     if (!reading) of.of_noise_but_readings = std::max(of.of_noise_but_readings, share);
   }

@@ -18,7 +18,7 @@ namespace vcnc {
 namespace {
 
 constexpr int kLagRounds = 3;
-constexpr double kLagStep = 50e-6, kLongest = 2e-3;  // [s]
+constexpr double kLagStep = 50e-6, kLongest = 4e-3;  // [s]
 constexpr double kUncertain = 1e-3;  // part of a lag's normal equation that holds it
 /// Of mean squares: what lags may leave of r, what one more may of what they leave, and what r must
 /// be of the noise of the position.
@@ -37,6 +37,13 @@ double product(const std::vector<double>& a, const std::vector<double>& b) {
   for (std::size_t k = 0; k < a.size(); ++k)
     if (std::isfinite(a[k]) && std::isfinite(b[k])) sum += a[k] * b[k];
   return sum;
+}
+
+/// Of a drive some lags, without that of a set-point which has no feed-forward to wait for.
+Lags of_drive(const ServoParams& servo, Lags lags) {
+  if (!(servo.velocity_ff > 0))
+    std::erase_if(lags, [](const LoopLag& l) { return l.value == &ServoParams::setpoint_lag; });
+  return lags;
 }
 
 /// Lags that leave least of r[0], of which r[1], ... take what each makes per second, from where
@@ -110,8 +117,13 @@ class LagFit {
       for (const Prediction& p : replica_.predict_all(machines))
         off.push_back(off_in_laps(record_, replica_.channels(), p));
       for (const std::size_t axis : axes_) {
-        std::vector<std::vector<double>> r;
-        for (const SeriesOfChannels& o : off) r.push_back(check_.equation(axis, o));
+        ServoParams& servo = now.machine.axes[axis].servo;
+        const Lags own = of_drive(servo, lags);
+        std::vector<std::vector<double>> r{check_.equation(axis, off[0])};
+        for (std::size_t i = 0; i < lags.size(); ++i)
+          if (std::any_of(own.begin(), own.end(),
+                          [&](const LoopLag& l) { return l.value == lags[i].value; }))
+            r.push_back(check_.equation(axis, off[i + 1]));
         now.left[axis] = mean_square(r[0]);
         if (round == 0) {
           const std::vector<double>& position =
@@ -123,11 +135,10 @@ class LagFit {
         // A later lag leaves r less what it makes.
         for (std::size_t i = 1; i < r.size(); ++i)
           for (std::size_t k = 0; k < r[i].size(); ++k) r[i][k] = (r[0][k] - r[i][k]) / kLagStep;
-        ServoParams& servo = now.machine.axes[axis].servo;
         const Eigen::VectorXd to =
-            bounded_lags(r, of(servo, lags), of(declared_.axes[axis].servo, lags));
-        for (std::size_t i = 0; i < lags.size(); ++i)
-          servo.*lags[i].value = to[static_cast<Eigen::Index>(i)];
+            bounded_lags(r, of(servo, own), of(declared_.axes[axis].servo, own));
+        for (std::size_t i = 0; i < own.size(); ++i)
+          servo.*own[i].value = to[static_cast<Eigen::Index>(i)];
       }
     }
     return now;
@@ -168,11 +179,11 @@ Machine with_lags_of(const Record& healthy, const Machine& declared) {
   const Lags all(kLoopLags.begin(), kLoopLags.end());
   Machine machine = declared;
   PerAxis<double> left{};
-  for (const Lags& lags : {Lags(all.begin() + 1, all.end()), all}) {
-    const WithLags with = fit.fitted(lags);
+  for (std::ptrdiff_t without = 2; without >= 0; --without) {
+    const WithLags with = fit.fitted(Lags(all.begin() + without, all.end()));
     for (const std::size_t axis : fit.axes()) {
       double& now = left[axis];
-      const bool one_more = lags.size() == all.size() && now < with.before[axis];
+      const bool one_more = now > 0 && now < with.before[axis];
       if (now == 0) now = with.before[axis];
       // Never, where it is noise.
       if (!(with.left[axis] < (one_more ? kWorthOneMore : kWorthIt) * now)) continue;

@@ -7,13 +7,17 @@
 // accelerates, a feed-forward that is late behind by as much: what both leave is what counts.) Lags
 // are fitted to nothing but r of the healthy run, by least squares, so that friction has no say:
 //
-//   min | r - sum_i d r / d tau_i  (tau_i - tau_i declared) |^2,   0 <= tau_i <= 2 ms
+//   min | r - sum_i d r / d tau_i  (tau_i - tau_i declared) |^2,   0 <= tau_i <= 4 ms
 //
 // and are kept where they take half of its mean square at least and that is more than noise: first
-// those of velocity and feed-forward, then that of the position loop, too, where it leaves a
-// quarter of what these do (with full feed-forward that loop has next to nothing to be late with).
-// Gains stay as declared. None is fitted of a sampled controller, whose lags are another number,
-// nor where command, position or force of an axis is not recorded.
+// those of velocity and feed-forward, then that of the set-point of the position loop, too, where
+// it leaves a quarter of what these do, and so that of the position loop itself (with full
+// feed-forward it has next to nothing to be late with). A set-point that waits for the feed-forward
+// (balancing filter) by tau puts the axis behind by v tau and is, in one run, a velocity
+// feed-forward that is Kv tau less: of a healthy machine the gain is believed, which somebody has
+// set. Without feed-forward nothing has to wait. Gains stay as declared. None is fitted of a
+// sampled controller, whose lags are another number, nor where command, position or force of an
+// axis is not recorded.
 #pragma once
 
 #include <array>
@@ -30,8 +34,9 @@ struct LoopLag {
   double ServoParams::*value;  ///< [s]
   std::string_view key, of;    ///< "position_lag_us", "the position loop"
 };
-inline constexpr std::array<LoopLag, 3> kLoopLags{
+inline constexpr std::array<LoopLag, 4> kLoopLags{
     LoopLag{&ServoParams::position_lag, "position_lag_us", "the position loop"},
+    LoopLag{&ServoParams::setpoint_lag, "setpoint_lag_us", "the set-point of the position loop"},
     LoopLag{&ServoParams::velocity_lag, "velocity_lag_us", "the measured velocity"},
     LoopLag{&ServoParams::feedforward_lag, "feedforward_lag_us", "the feed-forward"}};
 

@@ -37,6 +37,7 @@ constexpr Tolerance kResidues[] = {
     {"effects.setup.piece_offset.", ".shift_um", 100},
     {"effects.setup.piece_tilt.", ".tilt_urad", 500},
     {"effects.", ".scale_error.error_ppm", 1.5},
+    {"effects.", ".lead_error.error_ppm", 30},
     {"effects.probe.tip_radius.", ".larger_um", 1},
     {"effects.X.", ".thermal_drift.offset_um", 3},
     {"effects.Y.", ".thermal_drift.offset_um", 3},
@@ -104,6 +105,11 @@ std::string effect_of_key(const std::string& key) {
 }
 
 bool is_clamping(const std::string& key) { return key.starts_with("effects.setup."); }
+
+bool has_a_lead(const Machine& declared, std::size_t axis) {
+  return declared.axes[axis].servo.feedback == ServoParams::Feedback::load &&
+         declared.axes[axis].mechanics.motor_inertia > 0;
+}
 
 bool never_quite_absent(const std::string& key) {
   return std::any_of(std::begin(kResidues), std::end(kResidues), [&](const Tolerance& t) {
@@ -194,6 +200,12 @@ bool is_of_rotor(const std::string& key) {
   return key.starts_with("axes.") && key.find(".motor_inertia") != std::string::npos;
 }
 
+bool is_no_lead(const Machine& declared, const std::string& key) {
+  const std::size_t axis = axis_named(place_of_key(key));
+  return key.find(".lead_error.") != std::string::npos && axis < kAxisCount &&
+         !has_a_lead(declared, axis);
+}
+
 }  // namespace
 
 std::vector<FreedNumber> nuisances(const Machine& declared, Against against) {
@@ -206,6 +218,7 @@ std::vector<FreedNumber> nuisances(const Machine& declared, Against against) {
         against == Against::declaration ? uncertainty_of(declared, p.key) : nullptr;
     // A rotor is the same in both runs; what is on a table may be another.
     if (against == Against::healthy_run && is_of_rotor(p.key)) continue;
+    if (is_no_lead(declared, p.key)) continue;
     const double tolerance = told ? told->standard : tolerance_of(p.key, value);
     const bool free = told && told->free();
     if (tolerance <= 0 && !free) continue;

@@ -56,6 +56,10 @@ std::string effect_of_key(const std::string& key);
 /// Whether it says where the piece is clamped, which is no number of the machine.
 bool is_clamping(const std::string& key);
 
+/// Whether an axis has a screw that can be found wrong: with the loop closed on the motor it is as
+/// a wrong scale, and a linear motor has none.
+bool has_a_lead(const Machine& declared, std::size_t axis);
+
 /// What a machine is held against.
 enum class Against { declaration, healthy_run };
 
@@ -67,6 +71,9 @@ enum class Against { declaration, healthy_run };
 ///   damping of declared windup                 50 %
 ///   where the piece was clamped                free (100 um, 500 urad); reported above 5 um
 ///   scale of a linear axis                     1.5 ppm
+///   lead of a screw                            30 ppm, as of 3 K; where the loop is closed with
+///   the
+///                                              load
 ///   size of gauge and ball                     1 um; between two runs, too: a steel ring of 50 mm
 ///                                              in diameter grows by 0.6 um in 1 K
 ///   drift of a linear axis                     3 um with 1200 s: 0.15 um/min

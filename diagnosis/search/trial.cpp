@@ -48,6 +48,11 @@ bool is_place(const FreeNumber& n) {
   return has_part(n.key, ".centre_") || has_part(n.key, ".rest_");
 }
 
+bool is_wavelength(const FreeNumber& n) {
+  return has_part(n.key, ".period_") || has_part(n.key, "pitch_") ||
+         has_part(n.key, ".wavelength_");
+}
+
 bool has_no_phase(const FreeNumber& n) { return has_part(n.key, "_bow_"); }
 
 bool is_limit(const FreeNumber& n) { return has_part(n.key, ".range_clip.limit_"); }

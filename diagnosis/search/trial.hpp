@@ -43,6 +43,8 @@ bool is_fixed(const FreeNumber& number);
 bool is_phase(const FreeNumber& number);
 /// Where on the travel of an axis something is.
 bool is_place(const FreeNumber& number);
+/// Over the position of an axis, in a unit of that.
+bool is_wavelength(const FreeNumber& number);
 /// An amplitude that stands beside a wave and has no phase.
 bool has_no_phase(const FreeNumber& number);
 /// An amplitude whose null value is no limit at all: it does more the smaller it is.

@@ -17,12 +17,6 @@ bool contains(const std::string& text, const char* part) {
   return text.find(part) != std::string::npos;
 }
 
-/// Over the position of an axis, where its key has a unit of that.
-bool is_wavelength(const FreeNumber& n) {
-  return contains(n.key, ".period_") || contains(n.key, "pitch_") ||
-         contains(n.key, ".wavelength_");
-}
-
 constexpr WaveGrid kAboutLine{.first = -0.4, .apart = 0.1, .count = 9};  ///< waves per travel
 constexpr double kMostWaves = 2000;                                      ///< per travel
 constexpr double kSamplesPerWave = 4;     ///< at the least: shorter ones might be longer ones

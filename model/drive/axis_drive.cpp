@@ -83,8 +83,10 @@ AxisDriveOf<Real>::AxisDriveOf(const AxisParams& declared, const AxisParams& act
       motor_mobility_(kPlantTime / motor_inertia_),
       load_mobility_(kPlantTime / load_inertia_),
       laws_(!effects.laws.empty()),
+      start_(actual.limits.start),
       x_load_(actual.limits.start),
       x_motor_(actual.limits.start),
+      position_told_(actual.limits.start),
       last_raw_(setpoint_),
       last_shaped_(setpoint_) {
   for (std::size_t i = 0; i < kLanesOf<Real>; ++i) {
@@ -122,6 +124,7 @@ AxisDriveOf<Real>::AxisDriveOf(const AxisParams& declared, const AxisParams& act
     sampled_.emplace_back(kp, inertia, actual.servo.dead_time, lane(encoder(feedback_), 0));
   lag_share_ = servo.current_lag > 0 ? -std::expm1(-kPlantTime / servo.current_lag) : 1;
   position_share_ = share_of(actual.servo.position_lag);
+  setpoint_share_ = share_of(actual.servo.setpoint_lag);
   velocity_share_ = share_of(actual.servo.velocity_lag);
   feedforward_share_ = share_of(actual.servo.feedforward_lag);
 }
@@ -136,7 +139,8 @@ AxisDriveOf<Real>::AxisDriveOf(std::vector<AxisDriveOf<double>> drives)
       uneven_(std::any_of(drives.begin(), drives.end(), [](const auto& d) { return d.uneven_; })),
       motor_rubs_(
           std::any_of(drives.begin(), drives.end(), [](const auto& d) { return d.motor_rubs_; })),
-      laws_(drives[0].laws_) {
+      laws_(drives[0].laws_),
+      start_(drives[0].start_) {
   for (std::size_t i = 0; i < kLanesOf<Real>; ++i) {
     AxisDriveOf<double>& drive = drives[std::min(i, drives.size() - 1)];
     const auto from = drive.numbers();
@@ -162,7 +166,7 @@ template <class Real>
 bool AxisDriveOf<Real>::suits(const AxisDriveOf& other) const {
   return axis_ == other.axis_ && feedback_ == other.feedback_ &&
          travel_per_turn_ == other.travel_per_turn_ && force_limit_ == other.force_limit_ &&
-         two_masses_ == other.two_masses_ && laws_ == other.laws_ &&
+         start_ == other.start_ && two_masses_ == other.two_masses_ && laws_ == other.laws_ &&
          sampled_.empty() == other.sampled_.empty();
 }
 
@@ -173,6 +177,10 @@ void AxisDriveOf<Real>::couple(const TransmissionPort::Signal<double>& transmiss
     wave_ = transmission.wave;
     wave_number_ = 2 * kPi / transmission.wave_period;
     wave_phase_ = transmission.wave_phase;
+  }
+  if (transmission.lead != 0) {
+    uneven_ = true;
+    lead_ = transmission.lead;
   }
   motor_rubs_ = transmission.motor_dry > 0 || transmission.motor_viscous > 0;
   motor_dry_ = transmission.motor_dry;
@@ -196,12 +204,13 @@ void AxisDriveOf<Real>::couple(const TransmissionPort::Signal<double>& transmiss
 
 template <class Real>
 Real AxisDriveOf<Real>::unevenness() const {
-  Real ahead{};
-  if (!uneven_) return ahead;
+  if (!uneven_) return Real{};
+  Real ahead = lead_ * (x_motor_ - Real(start_));
   for (std::size_t i = 0; i < kLanesOf<Real>; ++i)
     if (const double wave = lane(wave_, i); wave != 0)
       set_lane(ahead, i,
-               wave * std::sin(lane(wave_number_, i) * lane(x_motor_, i) + lane(wave_phase_, i)));
+               lane(ahead, i) + wave * std::sin(lane(wave_number_, i) * lane(x_motor_, i) +
+                                                lane(wave_phase_, i)));
   return ahead;
 }
 
@@ -320,6 +329,7 @@ void AxisDriveOf<Real>::follow_up() {
   const Real measured = encoder(feedback_);
   const Real told = setpoint_.velocity, seen = observer_.velocity();
   setpoint_ = last_raw_ = last_shaped_ = {measured, choose(abs(seen) < abs(told), seen, told)};
+  position_told_ = measured;
   position_error_ = acceleration_told_ = 0.0;
   velocity_told_ = setpoint_.velocity;
 }
@@ -401,7 +411,8 @@ template <class Real>
 Real AxisDriveOf<Real>::control(const Setpoint& now, const Setpoint& next) {
   using std::max, std::min;
   const Real measured = encoder(feedback_);
-  position_error_ = lagged(position_error_, now.position - measured, position_share_);
+  position_told_ = lagged(position_told_, now.position, setpoint_share_);
+  position_error_ = lagged(position_error_, position_told_ - measured, position_share_);
   velocity_told_ = lagged(velocity_told_, now.velocity, feedforward_share_);
   const Real v_ref = servo_.kv * position_error_ + servo_.velocity_ff * velocity_told_;
   velocity_ = lagged(velocity_, observer_.velocity(), velocity_share_);

@@ -5,7 +5,7 @@
 // ends), so that velocity and acceleration feed-forward are smooth.
 //
 // Every 100 us (loop step, T), at its instant t:
-//   v_ref = Kv e + kvff v_f,   e: x_c - x_m behind a first-order lag tau_x
+//   v_ref = Kv e + kvff v_f,   e: x_b - x_m behind a first-order lag tau_x,   x_b: x_c behind tau_b
 //   F_ref = Kp (v_ref - v) + (Kp/Ti) int (v_ref - v) dt + kaff J a_f + F_a
 //   |F_ref| <= F_max; the integral is held while the force is limited
 //   v:    v_m behind a lag tau_v;   v_f, a_f: v_c and a_c behind a lag tau_f
@@ -31,10 +31,9 @@
 //   backlash without compliance: the same, the sides of the gap as stiff as K may be
 //   friction on the motor's side, F_fm: m_r x_m'' = F - F_s - F_fm; of a rigid axis it is friction
 //                of the one mass
-//   uneven transmission: the motor is at x_m - u, u = A sin(k x_m + psi), which its measuring
-//   system
-//                counts, and its inertia follows: m_r (x_m - u)'' in place of m_r x_m''; of a rigid
-//                axis J x'' - m_r u''
+//   uneven transmission: the motor is at x_m - u, u = A sin(k x_m + psi) + e (x_m - x_0), which its
+//                measuring system counts, and its inertia follows the wave: m_r (x_m - u)'' in
+//                place of m_r x_m''; of a rigid axis J x'' - m_r u''
 //
 // Integration: rigid exactly for a force constant over the step; two masses by the symplectic Euler
 // rule, with K limited to a resonance of 1.6 kHz (10 kN then wind the spring up by less than
@@ -285,11 +284,12 @@ class AxisDriveOf {
   Real motor_inertia_, load_inertia_;
   Real plant_mobility_, motor_mobility_, load_mobility_;  ///< plant step / inertia
   ServoPort::Signal<Real> servo_;
-  Real kp_{}, lag_share_{}, position_share_{}, velocity_share_{}, feedforward_share_{};
+  Real kp_{}, lag_share_{}, position_share_{}, setpoint_share_{}, velocity_share_{},
+      feedforward_share_{};
   bool two_masses_ = false;
   Real stiffness_{}, damping_{}, half_gap_{};
   bool uneven_ = false;
-  Real wave_{}, wave_number_{}, wave_phase_{};  ///< of an uneven transmission
+  Real lead_{}, wave_{}, wave_number_{}, wave_phase_{};  ///< of an uneven transmission
   bool motor_rubs_ = false;
   Real motor_dry_{}, motor_viscous_{}, motor_stiffness_{};
 
@@ -305,6 +305,7 @@ class AxisDriveOf {
   Chains<DisplacementPort> displacing_;
   bool laws_;          ///< some law needs motions_
   bool told_ = false;  ///< tell_commands() was called
+  double start_;       ///< where the axis was first
 
   // State.
   std::int64_t cycle_ = 0;
@@ -314,8 +315,8 @@ class AxisDriveOf {
   int plant_step_ = 0;
   double encoder_shift_ = 0;
   Real x_load_, v_load_{}, a_load_{}, x_motor_, v_motor_{};
-  Real position_error_{}, velocity_{}, velocity_told_{}, acceleration_told_{}, force_ref_{},
-      force_{}, integral_{}, load_force_{};
+  Real position_told_{}, position_error_{}, velocity_{}, velocity_told_{}, acceleration_told_{},
+      force_ref_{}, force_{}, integral_{}, load_force_{};
   Setpoint last_raw_, last_shaped_;
   AxisVector told_position_{}, told_velocity_{}, before_position_{}, before_velocity_{};
   bool force_known_ = false;  ///< tell_force() was called
@@ -333,10 +334,10 @@ class AxisDriveOf {
                  plant_mobility_, motor_mobility_, load_mobility_, servo_.kv, servo_.velocity_gain,
                  servo_.integral_time, servo_.velocity_ff, servo_.acceleration_ff,
                  servo_.current_lag, servo_.force_limit, kp_, lag_share_, position_share_,
-                 velocity_share_, feedforward_share_, stiffness_, damping_, half_gap_, wave_,
-                 wave_number_, wave_phase_, motor_dry_, motor_viscous_, motor_stiffness_, x_load_,
-                 x_motor_, last_raw_.position, last_raw_.velocity, last_shaped_.position,
-                 last_shaped_.velocity),
+                 setpoint_share_, velocity_share_, feedforward_share_, stiffness_, damping_,
+                 half_gap_, lead_, wave_, wave_number_, wave_phase_, motor_dry_, motor_viscous_,
+                 motor_stiffness_, x_load_, x_motor_, last_raw_.position, last_raw_.velocity,
+                 last_shaped_.position, last_shaped_.velocity, position_told_),
         observer_.numbers());
   }
 };

@@ -42,6 +42,7 @@
 #include "model/effects/integral_time_error.hpp"
 #include "model/effects/kv_error.hpp"
 #include "model/effects/lateral_play.hpp"
+#include "model/effects/lead_error.hpp"
 #include "model/effects/load_encoder_error.hpp"
 #include "model/effects/load_play.hpp"
 #include "model/effects/lost_motion.hpp"
@@ -106,7 +107,7 @@ using AllEffects = EffectList<
     // force of the motor
     TorqueConstantError, TorqueRipple, Cogging,
     // transmission
-    Windup, Backlash, TransmissionError, MotorFriction,
+    Windup, Backlash, LeadError, TransmissionError, MotorFriction,
     // friction: terms first, then what changes them
     Coulomb, Stribeck, GreaseDrag, Viscous, NonlinearViscous, Presliding, FrictionAsymmetry,
     FrictionZone, FrictionFade,

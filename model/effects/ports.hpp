@@ -162,6 +162,7 @@ struct TransmissionPort {
     T gap{};            ///< [m or rad]
     T compliance{};     ///< [m/N or rad/(N m)], 0 = rigid
     T damping_ratio{};  ///< of the free resonance
+    T lead{};           ///< the load is ahead of the motor by this much of the travel [m/m]
     /// The load is ahead of the motor by wave sin(2 pi q/period + phase); none where wave is 0.
     T wave{}, wave_period{}, wave_phase{};
     T motor_dry{};        ///< friction on the motor's side, seen from the load [N or N m]

@@ -25,7 +25,8 @@ e: scale error [m/m], q: position [m], q_0: where the scale is fixed [m])",
           R"(On a circle of radius R a radial error R (e_x cos^2 + e_y sin^2): the mean of the two makes it
 larger, half their difference an ellipse along the axes, cos(2 phi). The same at every feed
 and in both directions; grows with R.)",
-      .confusable = "thermal_expansion thermal_warm_up pitch_progressive tip_radius probe_gain",
+      .confusable =
+          "lead_error thermal_expansion thermal_warm_up pitch_progressive tip_radius probe_gain",
       .separate =
           "tip_radius and probe_gain do not grow with the radius of the circle; thermal ones "
           "change "

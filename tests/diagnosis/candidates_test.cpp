@@ -116,13 +116,52 @@ Candidate of_x(const std::string& effect) {
   return {};
 }
 
-TEST(Candidates, ASpringRestsHalfATravelBeyondItAtMost) {
+TEST(Candidates, AWaveIsTwiceTheTravelLongAtMost) {
+  for (const char* effect : {"transmission_error", "pitch_periodic", "cogging", "straightness"}) {
+    bool any = false;
+    for (const FreeNumber& n : of_x(effect).numbers)
+      if (n.key.find("period_mm") != std::string::npos ||
+          n.key.find("pitch_mm") != std::string::npos ||
+          n.key.find("wavelength_mm") != std::string::npos) {
+        any = true;
+        EXPECT_NEAR(n.max, 800, 1e-9) << n.key;
+      }
+    EXPECT_TRUE(any) << effect;
+  }
+  // Of a rotary axis a turn may be longer than its travel.
+  for (const Candidate& c : candidates(machine()))
+    if (c.name() == "A.load_encoder_error") {
+      EXPECT_GE(c.numbers[1].max, 400) << c.numbers[1].key;
+    }
+}
+
+TEST(Candidates, ALeadIsOneOfAnAxisThatIsClosedOnItsLoad) {
+  Machine machine;
+  const auto has_lead = [&] {
+    const std::vector<Candidate> all = candidates(machine);
+    const std::vector<FreedNumber> known = nuisances(machine);
+    const bool along = has_key(known, "effects.X.lead_error.error_ppm");
+    const bool candidate = std::any_of(
+        all.begin(), all.end(), [](const Candidate& c) { return c.name() == "X.lead_error"; });
+    EXPECT_EQ(along, candidate);
+    return along;
+  };
+  machine.axes[kX].servo.feedback = ServoParams::Feedback::load;
+  EXPECT_TRUE(has_lead());
+  machine.axes[kX].mechanics.motor_inertia = 0;  // a linear motor
+  EXPECT_FALSE(has_lead());
+  machine = {};
+  machine.axes[kX].servo.feedback = ServoParams::Feedback::motor;
+  EXPECT_FALSE(has_lead());
+}
+
+TEST(Candidates, ASpringRestsWithinTheTravel) {
   const Candidate c = of_x("cable_chain");
   ASSERT_EQ(c.numbers.size(), 3U);
   const FreeNumber& rest = c.numbers.back();
   EXPECT_EQ(rest.key, "effects.X.cable_chain.rest_mm");
-  EXPECT_NEAR(rest.min, -300, 1e-9);
-  EXPECT_NEAR(rest.max, 500, 1e-9);
+  EXPECT_NEAR(rest.min, -100, 1e-9);
+  EXPECT_NEAR(rest.max, 300, 1e-9);
 }
 
 TEST(Candidates, AZoneOfFrictionLiesWithinTheTravel) {

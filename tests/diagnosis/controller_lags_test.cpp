@@ -39,6 +39,21 @@ TEST(ControllerLags, TellALateFeedForward) {
   }
 }
 
+/// A balancing filter makes the set-point wait for the feed-forward; in one run a feed-forward that
+/// is less does the same, and is not believed.
+TEST(ControllerLags, TellASetPointThatWaits) {
+  Machine machine = later(0, 100);
+  machine.effects.deviations.push_back({"axes.X.setpoint_lag_us", 900});
+  machine.effects.deviations.push_back({"axes.X.feedforward_lag_us", 400});
+  const ServoParams found = with_lags_of(recorded(machine, 5), declared()).axes[kX].servo;
+  EXPECT_NEAR(1e6 * found.setpoint_lag, 900, 25);
+  EXPECT_NEAR(1e6 * (found.feedforward_lag - found.velocity_lag), 300, 25);
+  EXPECT_EQ(found.position_lag, 0);
+  Machine without = declared();
+  without.axes[kX].servo.velocity_ff = 0;
+  EXPECT_EQ(with_lags_of(recorded(machine, 5), without).axes[kX].servo.setpoint_lag, 0);
+}
+
 TEST(ControllerLags, StayAsDeclaredWhereNothingIsLater) {
   const Machine found = with_lags_of(recorded(later(0, 0), 2), declared());
   for (const LoopLag& lag : kLoopLags) EXPECT_EQ(found.axes[kX].servo.*lag.value, 0) << lag.key;
@@ -48,10 +63,10 @@ TEST(ControllerLags, AreToldWhereTheyAreOthers) {
   ServoParams was, is;
   EXPECT_EQ(told_lags(was, is), "");
   is.velocity_lag = 0.25e-3;
-  is.feedforward_lag = 2e-3;
+  is.feedforward_lag = 4e-3;
   EXPECT_EQ(
       told_lags(was, is),
-      "the measured velocity 0 -> 250 us, the feed-forward 0 -> 2000 us (none longer is sought)");
+      "the measured velocity 0 -> 250 us, the feed-forward 0 -> 4000 us (none longer is sought)");
 }
 
 TEST(ControllerLags, AreNotAskedForWithoutAForceNorOfASampledController) {

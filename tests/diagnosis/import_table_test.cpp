@@ -814,6 +814,8 @@ TEST(ImportTable, ZerosOfTwoEncodersAreTakenOff) {
   EXPECT_NEAR(apart.find(SignalKind::twist, 0)->value[1000],
               together.find(SignalKind::twist, 0)->value[1000] - 1e-5, 2e-6);
   EXPECT_FALSE(warned(together, "zeros of their own")) << all_warnings(together);
+  EXPECT_TRUE(together.find(SignalKind::twist, 0)->relative);
+  EXPECT_FALSE(together.find(SignalKind::position, 0)->relative);
 }
 
 TEST(ImportTable, AnEncoderThatStopsWhileTheOtherGoesOnIsRefused) {

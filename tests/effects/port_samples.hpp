@@ -166,6 +166,7 @@ struct PortSamples<TransmissionPort> {
     f(s.gap, positive(0, 1e-4, 1));
     f(s.compliance, positive(0, rotary ? 1e-5 : 1e-7, 1));
     f(s.damping_ratio, positive(0.01, 0.5, 10));
+    f(s.lead, within(1e-4, 1));
     f(s.wave, within(1e-6, 1));
     f(s.wave_period, positive(1e-3, 1, 1e6));
     f(s.wave_phase, within(3, 10));

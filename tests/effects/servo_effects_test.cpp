@@ -393,6 +393,30 @@ TEST(TransmissionError, MovesTheLoadIfTheLoopIsClosedOnTheMotor) {
              });
 }
 
+/// With the loop closed on the motor the load is off by e q; closed on the load the motor alone is.
+TEST(LeadError, IsOneOfTheScaleOnlyIfTheLoopIsClosedOnTheMotor) {
+  const LeadError effect{.error = 80e-6};
+  for (const auto side : {ServoParams::Feedback::motor, ServoParams::Feedback::load}) {
+    AxisParams params = axis();
+    params.servo.feedback = side;
+    params.limits.start = 0.03;
+    AxisEffects effects;
+    effects.get<LeadError>() = effect;
+    AxisDrive drive(params, effects), even(params);
+    double x = 0.03;
+    for (int k = 1; k <= 2000; ++k) {
+      x = 0.03 + 0.05 * kCycle * k;
+      const AxisCycle cycle = drive.follow({x, 0.05});
+      const double off = cycle.truth.back() - even.follow({x, 0.05}).truth.back();
+      const double travelled = effect.error * (x - 0.03);
+      if (k < 500) continue;
+      ASSERT_NEAR(cycle.second, travelled, 1e-9 + 0.002 * travelled);
+      ASSERT_NEAR(off, side == ServoParams::Feedback::motor ? travelled : 0, 0.2 * kUm);
+    }
+    EXPECT_GT(effect.error * (x - 0.03), 7 * kUm);
+  }
+}
+
 /// Of two masses at constant speed: the force of the drive, and the twist that it winds up.
 std::pair<double, double> drawn(const AxisEffects& effects, double v) {
   AxisDrive drive(axis(), effects);

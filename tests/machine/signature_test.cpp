@@ -177,6 +177,12 @@ const std::map<std::string, Check>& checks() {
        [](const Shown& s) {  // A times the lever of 30 mm, once per turn
          near(harmonic(s.off.front(), 1).amplitude(), 8 * unit::arcsec.to_si * 0.030, 0.01);
        }},
+      {"lead_error",
+       [](const Shown& s) {  // in proportion to the way
+         const Curve& off = s.off.front();
+         const double e = (off.y.back() - off.y.front()) / (off.x.back() - off.x.front());
+         near(std::abs(e), 100e-6, 0.01);
+       }},
       {"transmission_error",
        [](const Shown& s) { near(wave(s.off.front(), 10e-3).amplitude(), 2 * kUm, 0.01); }},
       {"load_encoder_error",

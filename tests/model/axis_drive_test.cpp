@@ -258,6 +258,24 @@ TEST(AxisDrive, VelocityLagPutsTheAxisAheadWhileItAccelerates) {
   EXPECT_NEAR(ahead() - without, -a * 0.0005 / 40, 0.02 * a * 0.0005 / 40);
 }
 
+// A set-point that is v tau behind is held, the axis with it, and the feed-forward passes by.
+TEST(AxisDrive, ASetPointLagPutsTheAxisBehindByTheWayOfThatTime) {
+  AxisParams params = axis(40, 1, 1);
+  const auto behind = [&] {
+    AxisDrive drive(params);
+    const double v = 0.2;
+    double error = 0;
+    for (int k = 1; k <= 600; ++k) {
+      const double x = v * k * kCycle;
+      error = x - drive.follow({x, v}).truth.back();
+    }
+    return error / v;
+  };
+  const double without = behind();
+  params.servo.setpoint_lag = 0.0008;
+  EXPECT_NEAR(behind() - without, 0.0008, 1e-6);
+}
+
 TEST(AxisDrive, AFeedForwardLagChangesNothingAtConstantSpeed) {
   AxisParams params = axis(40, 1, 1);
   const auto behind = [&] {
