@@ -101,7 +101,7 @@ void tell_unknown_forces(const DiagnoseOptions& options, const ForceOfAxes& unkn
 void tell_lags(const Machine& declared, const Machine& healthy, std::vector<std::string>& notes) {
   std::string lags;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    const std::string told = told_lags(declared.axes[axis].servo, healthy.axes[axis].servo);
+    const std::string told = told_lags(declared, healthy, axis);
     if (!told.empty()) lags += fmt::format("; {}: {}", kAxisNames[axis], told);
   }
   if (!lags.empty())

@@ -121,7 +121,7 @@ class Commissioner {
 
   void tell_lags(const Machine& m) {
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      const std::string lags = told_lags(of_.declared.axes[axis].servo, m.axes[axis].servo);
+      const std::string lags = told_lags(of_.declared, m, axis);
       if (!lags.empty())
         machine_.notes.push_back(
             fmt::format("{}: by its controller's own signals, lag of {}", kAxisNames[axis], lags));
@@ -141,6 +141,10 @@ class Commissioner {
     result_.notes = std::move(machine_.notes);
     // What controllers know stays what is declared.
     result_.machine = as_hypothesis(of_.declared, machine_.now.machine);
+    // What was fitted is known as well as others of its kind, and no better or worse.
+    std::erase_if(result_.machine.uncertainties, [&](const Uncertainty& u) {
+      return !u.exact() && has_key(machine_.now.nuisances.numbers, u.key);
+    });
     result_.figures =
         figures_of(of_.record, of_.replica, of_.declared, result_.machine, "all laps");
     tell_form();

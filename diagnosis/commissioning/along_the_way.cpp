@@ -61,12 +61,14 @@ std::vector<std::size_t> fit_along_the_way(MachineInFit& in, const std::string& 
     }
     const std::size_t best = in.simplest_of_best(few, leaves);
     if (!in.gains_enough(in.now, fitted[best], place, kShareOfLeft)) break;
-    found.push_back(few[best]);
-    const bool spring = in.candidates[few[best]].effect == CableChain::text.name;
-    std::erase_if(left, [&](std::size_t c) {  // where a spring rests stands for a weight
-      return c == few[best] || (spring && in.candidates[c].effect == WeightImbalance::text.name);
-    });
     converge_anew(in.evidence, fitted[best]);  // what goes along was linear about a machine without
+    std::erase(left, few[best]);
+    if (!in.gains_enough(in.now, fitted[best], place, kShareOfLeft)) continue;
+    found.push_back(few[best]);
+    if (in.candidates[few[best]].effect == CableChain::text.name)
+      std::erase_if(left, [&](std::size_t c) {  // where a spring rests stands for a weight
+        return in.candidates[c].effect == WeightImbalance::text.name;
+      });
     in.accept(std::move(fitted[best]), place, told(in.candidates[few[best]]));
     in.rest();
   }

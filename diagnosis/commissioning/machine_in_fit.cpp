@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "diagnosis/search/controller_lags.hpp"
+#include "diagnosis/search/screening.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {
@@ -77,15 +78,12 @@ FittedMachine MachineInFit::with_candidates(const FittedMachine& machine,
   return more;
 }
 
-double MachineInFit::per_sample(const FittedMachine& m) const {
-  return m.held_out / std::max(1.0, evidence.count(Role::held_out));
-}
-
 bool MachineInFit::gains_enough(const FittedMachine& than, const FittedMachine& better,
                                 const std::string& place, double least_share) const {
+  const Left left = left_in(evidence.chi2_of(than.residual, Role::held_out), place);
   return than.held_out - better.held_out >
-         std::max(options.least_gain * std::max(1.0, per_sample(than)),
-                  least_share * above_noise(than, place));
+         std::max(options.least_gain * std::max(1.0, left.chi2 / std::max(1.0, left.samples)),
+                  least_share * left.above_noise);
 }
 
 bool MachineInFit::stands_out(const std::string& place) const {
@@ -102,21 +100,27 @@ bool MachineInFit::stands_out(const std::string& place) const {
   return false;
 }
 
-/// Of an axis its own signals and the readings, else all.
-double MachineInFit::above_noise(const FittedMachine& m, const std::string& place) const {
+MachineInFit::Left MachineInFit::left_in(const std::vector<double>& chi2,
+                                         const std::string& place) const {
   const std::size_t axis = axis_named(place);
-  const std::vector<double> chi2 = evidence.chi2_of(m.residual, Role::held_out);
-  double above = 0;
+  Left left;
   for (std::size_t c = 0; c < chi2.size(); ++c) {
     const ComparedChannel& channel = of.replica.channels()[c];
-    if (axis == kAxisCount || is_reading(channel.kind) || channel.axis == axis)
-      above += std::max(0.0, chi2[c] - evidence.count(c, Role::held_out));
+    if (axis < kAxisCount && !is_reading(channel.kind) && channel.axis != axis) continue;
+    const double samples = evidence.count(c, Role::held_out);
+    left.chi2 += chi2[c];
+    left.samples += samples;
+    left.above_noise += std::max(0.0, chi2[c] - samples);
   }
-  return above;
+  return left;
 }
 
 void MachineInFit::accept(FittedMachine better, const std::string& place,
                           const std::string& chosen) {
+  const auto per_sample = [&](const FittedMachine& m) {
+    const Left left = left_in(Ground(evidence, m.residual, m.linear()).held_out_of, place);
+    return left.chi2 / std::max(1.0, left.samples);
+  };
   notes.push_back(fmt::format("{}: {}, chi-square per held-out sample {:.3g} -> {:.3g}", place,
                               chosen, per_sample(now), per_sample(better)));
   now = std::move(better);

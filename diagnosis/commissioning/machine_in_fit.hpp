@@ -39,8 +39,8 @@ class MachineInFit {
   FittedMachine with_candidates(const FittedMachine& machine,
                                 const std::vector<std::size_t>& chosen) const;
 
-  /// Whether it gains what noise would not, if noise were all that is left, and that share of what
-  /// is more than noise in the signals of a place.
+  /// Whether it gains what noise would not, if noise were all that is left in the signals of a
+  /// place, and that share of what is more than noise there.
   bool gains_enough(const FittedMachine& than, const FittedMachine& better,
                     const std::string& place, double least_share = 0) const;
   /// Whether some signal is more than noise, of an axis its own ones where it has any.
@@ -60,8 +60,12 @@ class MachineInFit {
   void fit_together();
 
  private:
-  double per_sample(const FittedMachine& m) const;
-  double above_noise(const FittedMachine& m, const std::string& place) const;
+  /// Of the held-out chi-square per channel, and what of it is more than noise: of an axis in its
+  /// own signals and the readings, else in all.
+  struct Left {
+    double chi2 = 0, samples = 0, above_noise = 0;
+  };
+  Left left_in(const std::vector<double>& chi2, const std::string& place) const;
 
   ControllerCheck controller_;
 };

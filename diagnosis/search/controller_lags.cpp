@@ -23,12 +23,28 @@ constexpr double kUncertain = 1e-3;  // part of a lag's normal equation that hol
 /// Of mean squares: what lags may leave of r, what one more may of what they leave, and what r must
 /// be of the noise of the position.
 constexpr double kWorthIt = 0.5, kWorthOneMore = 0.25, kAboveNoise = 4;
+constexpr double kBetter = 0.95;   // of what another explanation leaves
 constexpr std::size_t kAside = 5;  // samples to either side
 
-using Lags = std::vector<LoopLag>;
+/// What is late: a lag of the loops, or the whole command.
+struct Lateness {
+  const LoopLag* lag = nullptr;  ///< null: the command
 
-Machine with_later(Machine machine, const std::vector<std::size_t>& axes, const LoopLag& lag) {
-  for (const std::size_t axis : axes) machine.axes[axis].servo.*lag.value += kLagStep;
+  double of(const Machine& m, std::size_t axis) const {
+    return lag ? m.axes[axis].servo.*lag->value : m.effects.axis[axis].get<CommandDelay>().delay;
+  }
+  void put(Machine& m, std::size_t axis, double value) const {
+    (lag ? m.axes[axis].servo.*lag->value : m.effects.axis[axis].get<CommandDelay>().delay) = value;
+  }
+  bool is_of_setpoint() const { return lag && lag->value == &ServoParams::setpoint_lag; }
+};
+using Lags = std::vector<Lateness>;
+
+constexpr const LoopLag *kPosition = &kLoopLags[0], *kSetpoint = &kLoopLags[1],
+                        *kVelocity = &kLoopLags[2], *kFeedforward = &kLoopLags[3];
+
+Machine with_later(Machine machine, const std::vector<std::size_t>& axes, const Lateness& late) {
+  for (const std::size_t axis : axes) late.put(machine, axis, late.of(machine, axis) + kLagStep);
   return machine;
 }
 
@@ -42,7 +58,7 @@ double product(const std::vector<double>& a, const std::vector<double>& b) {
 /// Of a drive some lags, without that of a set-point which has no feed-forward to wait for.
 Lags of_drive(const ServoParams& servo, Lags lags) {
   if (!(servo.velocity_ff > 0))
-    std::erase_if(lags, [](const LoopLag& l) { return l.value == &ServoParams::setpoint_lag; });
+    std::erase_if(lags, [](const Lateness& l) { return l.is_of_setpoint(); });
   return lags;
 }
 
@@ -112,17 +128,16 @@ class LagFit {
     WithLags now{declared_, {}, {}};
     for (int round = 0; round <= kLagRounds; ++round) {
       std::vector<Machine> machines{now.machine};
-      for (const LoopLag& lag : lags) machines.push_back(with_later(now.machine, axes_, lag));
+      for (const Lateness& late : lags) machines.push_back(with_later(now.machine, axes_, late));
       std::vector<SeriesOfChannels> off;
       for (const Prediction& p : replica_.predict_all(machines))
         off.push_back(off_in_laps(record_, replica_.channels(), p));
       for (const std::size_t axis : axes_) {
-        ServoParams& servo = now.machine.axes[axis].servo;
-        const Lags own = of_drive(servo, lags);
+        const Lags own = of_drive(now.machine.axes[axis].servo, lags);
         std::vector<std::vector<double>> r{check_.equation(axis, off[0])};
         for (std::size_t i = 0; i < lags.size(); ++i)
           if (std::any_of(own.begin(), own.end(),
-                          [&](const LoopLag& l) { return l.value == lags[i].value; }))
+                          [&](const Lateness& l) { return l.lag == lags[i].lag; }))
             r.push_back(check_.equation(axis, off[i + 1]));
         now.left[axis] = mean_square(r[0]);
         if (round == 0) {
@@ -136,19 +151,19 @@ class LagFit {
         for (std::size_t i = 1; i < r.size(); ++i)
           for (std::size_t k = 0; k < r[i].size(); ++k) r[i][k] = (r[0][k] - r[i][k]) / kLagStep;
         const Eigen::VectorXd to =
-            bounded_lags(r, of(servo, own), of(declared_.axes[axis].servo, own));
+            bounded_lags(r, of(now.machine, axis, own), of(declared_, axis, own));
         for (std::size_t i = 0; i < own.size(); ++i)
-          servo.*own[i].value = to[static_cast<Eigen::Index>(i)];
+          own[i].put(now.machine, axis, to[static_cast<Eigen::Index>(i)]);
       }
     }
     return now;
   }
 
  private:
-  static Eigen::VectorXd of(const ServoParams& servo, const Lags& lags) {
+  static Eigen::VectorXd of(const Machine& machine, std::size_t axis, const Lags& lags) {
     Eigen::VectorXd all(static_cast<Eigen::Index>(lags.size()));
     for (std::size_t i = 0; i < lags.size(); ++i)
-      all[static_cast<Eigen::Index>(i)] = servo.*lags[i].value;
+      all[static_cast<Eigen::Index>(i)] = lags[i].of(machine, axis);
     return all;
   }
 
@@ -161,13 +176,16 @@ class LagFit {
 
 }  // namespace
 
-std::string told_lags(const ServoParams& was, const ServoParams& is) {
+std::string told_lags(const Machine& was, const Machine& is, std::size_t axis) {
   std::string told;
-  for (const LoopLag& lag : kLoopLags)
-    if (was.*lag.value != is.*lag.value)
-      told += fmt::format("{}{} {:.0f} -> {:.0f} us{}", told.empty() ? "" : ", ", lag.of,
-                          1e6 * was.*lag.value, 1e6 * is.*lag.value,
-                          is.*lag.value < kLongest ? "" : " (none longer is sought)");
+  const auto tell = [&](const Lateness& late, std::string_view of) {
+    const double before = late.of(was, axis), now = late.of(is, axis);
+    if (before != now)
+      told += fmt::format("{}{} {:.0f} -> {:.0f} us{}", told.empty() ? "" : ", ", of, 1e6 * before,
+                          1e6 * now, now < kLongest ? "" : " (none longer is sought)");
+  };
+  for (const LoopLag& lag : kLoopLags) tell({&lag}, lag.of);
+  tell({}, "the command");
   return told;
 }
 
@@ -176,21 +194,25 @@ Machine with_lags_of(const Record& healthy, const Machine& declared) {
   if (record.stretches.empty()) return declared;
   const LagFit fit(record, declared);
   if (fit.axes().empty()) return declared;
-  const Lags all(kLoopLags.begin(), kLoopLags.end());
   Machine machine = declared;
-  PerAxis<double> left{};
-  for (std::ptrdiff_t without = 2; without >= 0; --without) {
-    const WithLags with = fit.fitted(Lags(all.begin() + without, all.end()));
+  PerAxis<double> left{};  // nought where none was kept
+  const auto keep_where_better = [&](const Lags& lags, const Lags& instead) {
+    const WithLags these = fit.fitted(lags), those = instead.empty() ? these : fit.fitted(instead);
     for (const std::size_t axis : fit.axes()) {
-      double& now = left[axis];
-      const bool one_more = now > 0 && now < with.before[axis];
-      if (now == 0) now = with.before[axis];
-      // Never, where it is noise.
-      if (!(with.left[axis] < (one_more ? kWorthOneMore : kWorthIt) * now)) continue;
-      now = with.left[axis];
-      machine.axes[axis].servo = with.machine.axes[axis].servo;
+      const WithLags& best = those.left[axis] < kBetter * these.left[axis] ? those : these;
+      const double now = left[axis] > 0 ? left[axis] : best.before[axis];  // nought where noise
+      if (!(best.left[axis] < (left[axis] > 0 ? kWorthOneMore : kWorthIt) * now)) continue;
+      left[axis] = best.left[axis];
+      machine.axes[axis].servo = best.machine.axes[axis].servo;
+      machine.effects.axis[axis].get<CommandDelay>() =
+          best.machine.effects.axis[axis].get<CommandDelay>();
     }
-  }
+  };
+  const Lateness command, position{kPosition}, setpoint{kSetpoint}, velocity{kVelocity},
+      feedforward{kFeedforward};
+  keep_where_better({velocity, feedforward}, {});
+  keep_where_better({setpoint, velocity, feedforward}, {command, velocity, feedforward});
+  keep_where_better({position, setpoint, velocity, feedforward}, {});
   return machine;
 }
 

@@ -99,6 +99,24 @@ TEST(Commission, TakesNoiseForNoWave) {
       EXPECT_EQ(n.key.find(wave), std::string::npos) << n.key;
 }
 
+/// As uncertain as a data sheet is no number that was fitted: a change of it would be none.
+TEST(Commission, WhatWasFittedIsNoMoreUncertain) {
+  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
+  Effects effects;
+  effects.axis[kX].get<Coulomb>().level = 180;
+  RunOfMachine run = reversals_in_the_air(effects);
+  run.declared.effects.axis[kX].get<Coulomb>().level = 150;
+  run.declared.uncertainties = {{"effects.X.coulomb.level_N", 40, {}},
+                                {"axes.Y.load_kg", 0, {}}};  // exact
+  MachineReplica replica(run.record, run.declared, run.piece);
+  std::vector<Candidate> all = candidates(run.declared);
+  std::erase_if(all, [](const Candidate& c) { return c.place != "X"; });
+  const Machine fitted = commission({run.record, replica, run.declared, all}).machine;
+  EXPECT_NEAR(number_of(fitted, "effects.X.coulomb.level_N"), 180, 0.02 * 180);
+  ASSERT_EQ(fitted.uncertainties.size(), 1U);
+  EXPECT_EQ(fitted.uncertainties[0].key, "axes.Y.load_kg");
+}
+
 TEST(Commission, StopsInTheMidstOfAFit) {
   Effects effects;
   effects.axis[kX].get<Coulomb>().level = 180;

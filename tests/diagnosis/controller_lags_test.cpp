@@ -54,18 +54,29 @@ TEST(ControllerLags, TellASetPointThatWaits) {
   EXPECT_EQ(with_lags_of(recorded(machine, 5), without).axes[kX].servo.setpoint_lag, 0);
 }
 
+TEST(ControllerLags, TellACommandThatIsDelayed) {
+  Machine machine = later(0, 100);
+  machine.effects.axis[kX].get<CommandDelay>().delay = 0.6e-3;
+  const Machine found = with_lags_of(recorded(machine, 6), declared());
+  EXPECT_NEAR(1e3 * found.effects.axis[kX].get<CommandDelay>().delay, 0.6, 0.01);
+  EXPECT_EQ(found.axes[kX].servo.setpoint_lag, 0);
+  EXPECT_EQ(told_lags(declared(), found, kX).find("the set-point"), std::string::npos);
+  EXPECT_NE(told_lags(declared(), found, kX).find("the command 0 -> "), std::string::npos)
+      << told_lags(declared(), found, kX);
+}
+
 TEST(ControllerLags, StayAsDeclaredWhereNothingIsLater) {
   const Machine found = with_lags_of(recorded(later(0, 0), 2), declared());
   for (const LoopLag& lag : kLoopLags) EXPECT_EQ(found.axes[kX].servo.*lag.value, 0) << lag.key;
 }
 
 TEST(ControllerLags, AreToldWhereTheyAreOthers) {
-  ServoParams was, is;
-  EXPECT_EQ(told_lags(was, is), "");
-  is.velocity_lag = 0.25e-3;
-  is.feedforward_lag = 4e-3;
+  Machine was, is;
+  EXPECT_EQ(told_lags(was, is, kX), "");
+  is.axes[kX].servo.velocity_lag = 0.25e-3;
+  is.axes[kX].servo.feedforward_lag = 4e-3;
   EXPECT_EQ(
-      told_lags(was, is),
+      told_lags(was, is, kX),
       "the measured velocity 0 -> 250 us, the feed-forward 0 -> 4000 us (none longer is sought)");
 }
 
