@@ -36,7 +36,7 @@ struct Lateness {
   void put(Machine& m, std::size_t axis, double value) const {
     (lag ? m.axes[axis].servo.*lag->value : m.effects.axis[axis].get<CommandDelay>().delay) = value;
   }
-  bool is_of_setpoint() const { return lag && lag->value == &ServoParams::setpoint_lag; }
+  bool is_beside_feedforward() const { return !lag || lag->value == &ServoParams::setpoint_lag; }
 };
 using Lags = std::vector<Lateness>;
 
@@ -55,10 +55,11 @@ double product(const std::vector<double>& a, const std::vector<double>& b) {
   return sum;
 }
 
-/// Of a drive some lags, without that of a set-point which has no feed-forward to wait for.
+/// Of a drive some lags: without feed-forward no set-point waits for it, and a command that is late
+/// is much as a gain that is lower.
 Lags of_drive(const ServoParams& servo, Lags lags) {
   if (!(servo.velocity_ff > 0))
-    std::erase_if(lags, [](const Lateness& l) { return l.is_of_setpoint(); });
+    std::erase_if(lags, [](const Lateness& l) { return l.is_beside_feedforward(); });
   return lags;
 }
 

@@ -16,8 +16,9 @@
 // nothing to be late with). A set-point that waits for the feed-forward (balancing filter) by tau
 // puts the axis behind by v tau and is, in one run, a velocity feed-forward that is Kv tau less: of
 // a healthy machine the gain is believed, which somebody has set. Without feed-forward nothing has
-// to wait. Gains stay as declared. None is fitted of a sampled controller, whose lags are another
-// number, nor where command, position or force of an axis is not recorded.
+// to wait, and of these two none is sought. Gains stay as declared. None is fitted of a sampled
+// controller, whose lags are another number, nor where command, position or force of an axis is not
+// recorded.
 #pragma once
 
 #include <array>
