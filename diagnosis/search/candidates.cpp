@@ -119,8 +119,8 @@ Range range_with_a_motor_side(const Machine& declared, const std::string& key, R
 namespace {
 
 /// A zone lies within the travel of its axis and takes half of it at most: a wider one is friction
-/// as such. A spring rests within it: else it is a weight. A wave is twice as long at most, or a
-/// turn of a rotary axis and a little: a longer one is none.
+/// as such. A spring rests half a travel beyond it at most: else it is a weight. A wave is twice as
+/// long at most, or a turn of a rotary axis and a little: a longer one is none.
 void keep_within_travel(const Machine& declared, Candidate& of_axis) {
   constexpr double kTurn_deg = 400;
   const std::size_t axis = axis_named(of_axis.place);
@@ -130,7 +130,8 @@ void keep_within_travel(const Machine& declared, Candidate& of_axis) {
                high = declared.axes[axis].limits.max / unit, travel = high - low;
   for (FreeNumber& n : of_axis.numbers) {
     if (is_place(n)) n.min = low, n.max = high;
-    if (n.key.find(".rest_") != std::string::npos) n.typical = travel / 10;
+    if (n.key.find(".rest_") != std::string::npos)
+      n.min -= travel / 2, n.max += travel / 2, n.typical = travel / 10;
     if (n.key.find(".width_") != std::string::npos || n.key.find(".edge_") != std::string::npos)
       n.max = std::min(n.max, travel / 2);
     if (is_wavelength(n) && si_of_unit(n.key) == unit)

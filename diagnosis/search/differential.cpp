@@ -286,12 +286,14 @@ Difference difference_of(const Record& now, const MeasuredSignal& signal, const 
     return mean;
   Difference each = less_laps(signal.value, off, as_late);
   each.noise_scale = 1;  // the noise of both runs is in what its laps differ by
+  Partition whole = partition(now);
+  whole.run_in.clear();  // where first laps differ most
   const auto scatter = [&](const Difference& d) {
     std::vector<double> left(d.value.size(), kMissing);
     for (const auto& [lap, laps] : as_late)
       for (std::size_t k = lap->begin; k < lap->end; ++k)
         left[k] = d.value[k] - yhat[sample_of(*laps.front(), *lap, k)];
-    return lap_scatter(partition(now), left).value_or(0) * d.noise_scale;
+    return lap_scatter(whole, left).value_or(0) * d.noise_scale;
   };
   return scatter(each) < kClearlyLess * scatter(mean) ? each : mean;
 }

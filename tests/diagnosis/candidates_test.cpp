@@ -155,13 +155,13 @@ TEST(Candidates, ALeadIsOneOfAnAxisThatIsClosedOnItsLoad) {
   EXPECT_FALSE(has_lead());
 }
 
-TEST(Candidates, ASpringRestsWithinTheTravel) {
+TEST(Candidates, ASpringRestsHalfATravelBeyondItAtMost) {
   const Candidate c = of_x("cable_chain");
   ASSERT_EQ(c.numbers.size(), 3U);
   const FreeNumber& rest = c.numbers.back();
   EXPECT_EQ(rest.key, "effects.X.cable_chain.rest_mm");
-  EXPECT_NEAR(rest.min, -100, 1e-9);
-  EXPECT_NEAR(rest.max, 300, 1e-9);
+  EXPECT_NEAR(rest.min, -300, 1e-9);
+  EXPECT_NEAR(rest.max, 500, 1e-9);
 }
 
 TEST(Candidates, AZoneOfFrictionLiesWithinTheTravel) {

@@ -70,6 +70,21 @@ TEST(LessHealthy, HoldsALapAgainstTheHealthyOneThatCameAsLateWhereLapsDifferAlik
   EXPECT_GT(d.noise_scales({{SignalKind::force, 0}}).front(), 1);  // whose laps are alike
 }
 
+/// What first laps have of what came before them tells no noise, and is in both runs.
+TEST(LessHealthy, HoldsAFirstLapAgainstTheFirstOneWhereTheirBeginningsDiffer) {
+  const auto add_run_in = [](Record& record) {
+    std::vector<double>& position = position_of(record);
+    for (const Stretch& s : record.stretches)
+      for (std::size_t k = s.begin; k < s.begin + 150 && s.repetition == 0; ++k)
+        position[k] += 100 * toy::kPositionNoise * std::exp(-static_cast<double>(k - s.begin) / 40);
+  };
+  Record now = measured(1), before = measured(2);
+  add_run_in(now);
+  add_run_in(before);
+  const DifferentialRecord d = less_healthy(now, healthy(before));
+  EXPECT_NEAR(left_of(d), std::sqrt(2.0) * toy::kPositionNoise, 0.05 * toy::kPositionNoise);
+}
+
 TEST(LessHealthy, TakesTheMeanOffWhereOnlyTheHealthyLapsDiffer) {
   Record before = measured(2);
   add_turning(before, 10 * toy::kPositionNoise);
