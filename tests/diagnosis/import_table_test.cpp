@@ -918,6 +918,7 @@ TEST_F(RecordFile, ReadsBackWhatWasWrittenToTheLastBit) {
   record.machine_toml = to_toml(declared());
   record.warnings = {"one", "two"};
   record.signals[1].value[7] = kMissing;
+  record.signals[1].relative = true;
   const std::string file = folder_ / "run.h5";
   write_record(record, file);
   EXPECT_TRUE(is_record_file(file));
@@ -930,6 +931,7 @@ TEST_F(RecordFile, ReadsBackWhatWasWrittenToTheLastBit) {
   for (std::size_t i = 0; i < back.signals.size(); ++i) {
     EXPECT_EQ(back.signals[i].kind, record.signals[i].kind);
     EXPECT_EQ(back.signals[i].resolution, record.signals[i].resolution);
+    EXPECT_EQ(back.signals[i].relative, record.signals[i].relative);
     for (std::size_t k = 0; k < record.samples(); ++k) {
       const double a = back.signals[i].value[k], b = record.signals[i].value[k];
       EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << i << " " << k;

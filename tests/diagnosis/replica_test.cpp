@@ -5,6 +5,7 @@
 #include <future>
 
 #include "diagnosis/records/commanded_motion.hpp"
+#include "diagnosis/records/series.hpp"
 #include "model/probe/noise.hpp"
 #include "tests/diagnosis/recorded_run.hpp"
 
@@ -368,6 +369,13 @@ TEST(MachineReplica, AnAxisWithoutCommandThatHasForceAndTwistIsFollowed) {
   EXPECT_LT(rms_off(MachineReplica(noisy, declared, std::nullopt).predict(declared), 0), 0.05);
   record.signals.push_back({SignalKind::deflection, 0, "", any, 0});
   EXPECT_FALSE(is_followed(record, kC)) << "the pose is known better from the positions";
+}
+
+/// Two encoders that count from anywhere: the prediction has the mean of what was measured.
+TEST(SeriesWithMean, IsMovedWhereBothAreKnown) {
+  const std::vector<double> moved = with_mean_of({5, kMissing, 7, 9}, {0, 100, 1, 2, 3});
+  EXPECT_EQ(moved, (std::vector<double>{6, 106, 7, 8, 9}));
+  EXPECT_EQ(with_mean_of({kMissing}, {1.0}), std::vector<double>{1});
 }
 
 TEST(MachineReplica, AGapStaysAGapUntilTheDriveHasForgotten) {

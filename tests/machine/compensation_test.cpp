@@ -155,6 +155,19 @@ INSTANTIATE_TEST_SUITE_P(
              0.02,
              0.01,
              1.95},
+        Case{"lead_error",
+             [](Machine& m) {
+               m.axes[kX].servo.feedback = ServoParams::Feedback::motor;
+               of<LeadError>(m, kX).error = 100e-6;
+             },
+             Showing::circle,
+             kX,
+             {},
+             max_abs,
+             100e-6 * kRadius,
+             0.02,
+             0.01,
+             1.95},
         Case{"squareness",
              [](Machine& m) { m.effects.get<Squareness>() = {.xy = 200e-6, .xz = 0, .yz = 0}; },
              Showing::circle,
