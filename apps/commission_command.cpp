@@ -52,7 +52,7 @@ int commission_command(const CommissionOptions& options) {
     std::cout << options.out << ": interrupted, nothing is written\n";
     return kExitInterrupted;
   }
-  write_whole_file(options.out, to_toml(c.machine));
+  write_whole_file(options.out, brief_toml(c.machine));
   std::cout << "model: " << options.out << '\n';
   return kExitOk;
 }

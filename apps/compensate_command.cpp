@@ -63,7 +63,7 @@ int compensate_command(const CompensateOptions& options) {
   if (!options.out.empty()) {
     Machine compensated = machine;
     compensated.nc.compensation = proposal.settings;
-    write_whole_file(options.out, to_toml(compensated));
+    write_whole_file(options.out, brief_toml(compensated));
     std::cout << "machine: " << options.out << '\n';
   }
   if (options.measure) print(compare_compensation(machine, proposal.settings));

@@ -317,7 +317,7 @@ int diagnose_command(const DiagnoseOptions& options) {
   DiagnosisStory story{.diagnosis = d, .record = seen, .residuals = {}};
   if (replica) story.residuals = model_residuals(seen, *replica, d.declared, d.found);
   write_whole_file(folder / "diagnosis.json", to_json(d, record.source));
-  write_whole_file(folder / "found.toml", to_toml(as_hypothesis(d.declared, d.found)));
+  write_whole_file(folder / "found.toml", brief_toml(as_hypothesis(d.declared, d.found)));
   write_whole_file(folder / page, diagnosis_page(story));
   std::cout << "model:  " << (folder / "found.toml").string() << '\n'
             << "report: " << (folder / page).string() << '\n';

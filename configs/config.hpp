@@ -39,6 +39,8 @@ PieceParams parse_piece(std::string_view toml, const std::string& name);
 /// shortest decimal that does so.
 std::string to_toml(const Machine& machine);
 std::string to_toml(const PieceParams& piece);
+/// Without the tables of which every value is the default; parse(brief_toml(x)) gives x as well.
+std::string brief_toml(const Machine& machine);
 
 /// The reference of all keys as Markdown: key, unit, range, default, meaning.
 std::string machine_key_reference();

@@ -1,5 +1,6 @@
 #include "configs/toml_writer.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "configs/config.hpp"
@@ -49,10 +50,28 @@ void TomlWriter::operator()(std::string_view key, const std::vector<std::string>
   line(key, "[" + text + "]");
 }
 
+std::string TomlWriter::text() const { return text_beyond({}); }
+
+std::string TomlWriter::text_beyond(const TomlWriter& other) const {
+  std::string text = lines_;
+  for (const std::string& table : tables_)
+    if (std::find(other.tables_.begin(), other.tables_.end(), table) == other.tables_.end())
+      text += table;
+  return text;
+}
+
 std::string to_toml(const Machine& machine) {
   TomlWriter w;
   Machine::fields(machine, w);
   return w.text();
+}
+
+std::string brief_toml(const Machine& machine) {
+  TomlWriter w, by_default;
+  Machine::fields(machine, w);
+  const Machine nothing_declared;
+  Machine::fields(nothing_declared, by_default);
+  return w.text_beyond(by_default);
 }
 
 std::string to_toml(const PieceParams& piece) {

@@ -66,7 +66,7 @@ class TomlWriter {
     for (const T& element : v) {
       TomlWriter inner;
       T::fields(element, inner);
-      tables_ += fmt::format("\n[[{}]]\n{}", full(key), inner.lines_);
+      tables_.push_back(fmt::format("\n[[{}]]\n{}", full(key), inner.lines_));
     }
   }
   template <class F>
@@ -74,11 +74,14 @@ class TomlWriter {
     TomlWriter inner;
     inner.path_ = full(key);
     f(inner);
-    if (!inner.lines_.empty()) tables_ += fmt::format("\n[{}]\n{}", inner.path_, inner.lines_);
-    tables_ += inner.tables_;
+    if (!inner.lines_.empty())
+      tables_.push_back(fmt::format("\n[{}]\n{}", inner.path_, inner.lines_));
+    tables_.insert(tables_.end(), inner.tables_.begin(), inner.tables_.end());
   }
 
-  std::string text() const { return lines_ + tables_; }
+  std::string text() const;
+  /// Without the tables that `other` has with the same values.
+  std::string text_beyond(const TomlWriter& other) const;
 
  private:
   static std::string quoted(const std::string& v);
@@ -93,7 +96,8 @@ class TomlWriter {
     lines_ += fmt::format("{} = {}\n", key, value);
   }
 
-  std::string path_, lines_, tables_;
+  std::string path_, lines_;
+  std::vector<std::string> tables_;  ///< each with its heading
 };
 
 }  // namespace vcnc

@@ -45,6 +45,24 @@ TEST(Config, EveryShippedMachineLoadsWithItsPiece) {
   EXPECT_GE(count, 3u);
 }
 
+/// What a diagnosis writes of a machine with one declared axis is about that axis.
+TEST(Config, TablesOfDefaultsAreLeftOutOfABriefFile) {
+  for (const auto& entry : std::filesystem::directory_iterator(kMachines)) {
+    const Machine m = load_machine(entry.path());
+    EXPECT_EQ(to_toml(parse_machine(brief_toml(m), "brief")), to_toml(m)) << entry.path();
+  }
+  const std::string brief = brief_toml(
+      parse_machine("name = \"joint\"\n[axes.C]\nkv_per_s = 18\n[effects.C.coulomb]\nlevel_Nm = 1\n"
+                    "[[uncertainty]]\nkey = \"axes.C.load_kgm2\"\nstandard = 1\n",
+                    "m"));
+  EXPECT_NE(brief.find("[axes.C]\nmin_deg = "), brief.npos) << brief;
+  EXPECT_NE(brief.find("kv_per_s = 18.0\n"), brief.npos) << brief;
+  EXPECT_NE(brief.find("[[uncertainty]]"), brief.npos) << brief;
+  EXPECT_EQ(brief.find("[axes.X]"), brief.npos) << brief;
+  EXPECT_EQ(brief.find("[probe]"), brief.npos) << brief;
+  EXPECT_EQ(brief.find("[nc"), brief.npos) << brief;
+}
+
 TEST(Config, EveryShippedPieceLoads) {
   std::size_t count = 0;
   for (const auto& entry :
