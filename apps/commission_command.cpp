@@ -36,7 +36,7 @@ int commission_command(const CommissionOptions& options) {
     return !stop_requested();
   };
   const Commissioning c =
-      commission({record, *replica, declared, candidates(declared)}, {}, keep_going);
+      commission({record, *replica, declared, candidates(declared, record)}, {}, keep_going);
   progress.clear();
   if (c.numbers.empty() && !stop_requested())
     throw InputError(record.source +

@@ -185,14 +185,6 @@ int compare_models(const DiagnoseOptions& options, const Record& record, const M
   return stop_requested() ? kExitInterrupted : kExitOk;
 }
 
-/// Whether a place is an axis of which a record of single axes has nothing at all. Where the probe
-/// was read, an axis that stands shows, too.
-bool is_unrecorded_axis(const std::string& place, const Record& record) {
-  for (const MeasuredSignal& s : record.signals)
-    if (is_reading(s.kind) || place == kAxisNames[s.axis]) return false;
-  return axis_named(place) < kAxisCount;
-}
-
 /// Of an axis that is not recorded nothing can be held against the record.
 void check_recorded(const std::vector<std::string>& suspects, const std::vector<Candidate>& all,
                     const std::vector<std::string>& numbers, const Record& record) {
@@ -203,7 +195,7 @@ void check_recorded(const std::vector<std::string>& suspects, const std::vector<
     for (const std::string& key : numbers)
       if (is_suspected({suspect}, key)) places.push_back(place_of_key(key));
     if (!places.empty() && std::all_of(places.begin(), places.end(), [&](const std::string& place) {
-          return is_unrecorded_axis(place, record);
+          return holds_nothing_of(record, place);
         }))
       throw InputError(fmt::format("--suspect: \"{}\": {} holds nothing of {}", suspect,
                                    record.source, places.front()));
@@ -223,10 +215,9 @@ std::vector<Candidate> candidates_of(const DiagnoseOptions& options, const Recor
   for (const FreedNumber& n : nuisances(declared)) numbers.push_back(n.number.key);
   check_recorded(options.suspects, all, numbers, record);
   all = suspected(std::move(all), numbers, options.suspects);
-  std::erase_if(all, [&](const Candidate& c) { return is_unrecorded_axis(c.place, record); });
-  // About one place an axis that turns as it goes looks out of square and of another scale.
-  if (record.on_table && record.on_table->is_bar() && options.suspects.empty())
-    std::erase_if(all, [](const Candidate& c) { return c.effect == "angular_errors"; });
+  std::erase_if(all, [&](const Candidate& c) {
+    return options.suspects.empty() ? !is_sought(record, c) : holds_nothing_of(record, c.place);
+  });
   return all;
 }
 

@@ -23,7 +23,8 @@
 namespace vcnc {
 namespace {
 
-constexpr double kWellOff = 10;  // times the noise
+constexpr double kWellOff = 10;           // times the noise
+constexpr double kNearlyFarthest = 0.98;  // of what a number is believed to be off
 
 const std::vector<std::string> kGains{"kv_error",
                                       "velocity_ff_error",
@@ -53,7 +54,7 @@ class Commissioner {
     if (keep_going_) machine_.evidence.stop_when([this] { return !keep_going_(now_); });
     const Machine begun = with_lags_of(of.record, of.declared);
     tell_lags(begun);
-    machine_.now = fit_declared(machine_.evidence, begun);
+    machine_.now = fit_declared(machine_.evidence, begun, Against::reckoning);
   }
 
   Commissioning run() {
@@ -136,7 +137,8 @@ class Commissioner {
       const double half = i == intervals.end() ? 0 : i->second.half_width;
       result_.numbers.push_back({n.number.key, n.value, std::max(n.number.min, n.value - half),
                                  std::min(n.number.max, n.value + half)});
-      if (at_its_most(n.number, n.value)) at_most.push_back(n.number.key);
+      if (at_its_most(n.number, n.value) || std::abs(n.pull()) > kNearlyFarthest * kFarthestPull)
+        at_most.push_back(n.number.key);
     }
     result_.notes = std::move(machine_.notes);
     // What controllers know stays what is declared.

@@ -63,7 +63,9 @@ std::vector<std::size_t> fit_along_the_way(MachineInFit& in, const std::string& 
     if (!in.gains_enough(in.now, fitted[best], place, kShareOfLeft)) break;
     converge_anew(in.evidence, fitted[best]);  // what goes along was linear about a machine without
     std::erase(left, few[best]);
-    if (!in.gains_enough(in.now, fitted[best], place, kShareOfLeft)) continue;
+    if (!in.gains_enough(in.now, fitted[best], place, kShareOfLeft) ||
+        in.is_as_declared(fitted[best]))
+      continue;
     found.push_back(few[best]);
     if (in.candidates[few[best]].effect == CableChain::text.name)
       std::erase_if(left, [&](std::size_t c) {  // where a spring rests stands for a weight

@@ -1,7 +1,6 @@
 #include "diagnosis/commissioning/friction_fit.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include "diagnosis/search/refit.hpp"
 
@@ -25,10 +24,11 @@ const std::vector<FrictionLaw> kFrictionLaws{
     {"dry, viscous and break-away friction with pre-sliding",
      {"coulomb", "viscous", "stribeck", "presliding"}}};
 
-/// Whether a fit has left numbers where it began: what was gained is not theirs.
-bool nothing_moved(const std::vector<FreedNumber>& begun, const std::vector<FreedNumber>& now) {
-  return std::equal(begun.begin(), begun.end(), now.begin(), now.end(),
-                    [](const FreedNumber& a, const FreedNumber& b) { return a.value == b.value; });
+/// Whether a fit has left numbers where they were: what was gained is not theirs.
+bool nothing_moved(const Machine& before, const std::vector<FreedNumber>& now) {
+  return std::all_of(now.begin(), now.end(), [&](const FreedNumber& n) {
+    return n.value == number_of(before, n.number.key);
+  });
 }
 
 }  // namespace
@@ -72,10 +72,9 @@ std::pair<FittedMachine, std::string> FrictionFit::with_law(
     std::vector<std::size_t> law = machine_.the(kFrictionLaws[i].effects, place_);
     if (law.empty()) return;
     law.insert(law.end(), beside.begin(), beside.end());
-    const FittedMachine begun = machine_.with_candidates(from, law);
-    trials[i] = begun;
+    trials[i] = machine_.with_candidates(from, law);
     converge(machine_.evidence, trials[i]);
-    if (nothing_moved(begun.numbers(), trials[i].numbers())) trials[i] = from;
+    if (nothing_moved(from.machine, trials[i].numbers())) trials[i] = from;
   });
   const FittedMachine* best = &from;
   for (const FittedMachine& trial : trials)
@@ -97,12 +96,15 @@ void FrictionFit::fit_with(std::size_t gain) {
 void FrictionFit::fit_part_of_motor() {
   const std::vector<std::size_t> motor = machine_.the({"motor_friction"}, place_);
   if (motor.empty()) return;
-  // It does little that friction of the load does not, so no way leads there from none of it.
-  constexpr std::array kShares{0.1, 0.35};
-  std::vector<FittedMachine> better(kShares.size());
+  // It does little that friction of the load does not, so no way leads there from none of it. What
+  // is declared may lack its bristles alone.
+  std::vector<double> shares{0.1, 0.35};
+  const std::string level = machine_.candidates[motor[0]].numbers.front().key;
+  if (number_of(machine_.now.machine, level) > 0) shares.push_back(0);
+  std::vector<FittedMachine> better(shares.size());
   machine_.evidence.each_together(better.size(), [&](std::size_t i) {
     better[i] = machine_.with_candidates(machine_.now, motor);
-    move_to_motor(better[i], kShares[i]);
+    move_to_motor(better[i], shares[i]);
     converge(machine_.evidence, better[i]);
   });
   const auto best = std::min_element(
@@ -124,7 +126,8 @@ void FrictionFit::move_to_motor(FittedMachine& m, double share) const {
           moved = share * n.value;
           n.value -= moved;
         }
-        if (n.number.key.starts_with(of_axis + to)) n.value = moved;
+        if (n.number.key.starts_with(of_axis + to))
+          n.value = number_of(m.machine, n.number.key) + moved;
         if (n.number.key.starts_with(of_axis + "motor_friction.stiffness") && n.value == 0)
           n.value = n.number.typical;
       }

@@ -41,9 +41,18 @@ const FreeNumber& limited_number(const DiagnosisCase& of, const SelectionResult&
   return of.candidates[candidate].numbers[at->trial.directions.front().number];
 }
 
+/// As far as the key allows: what would have to be larger to be seen is not seen, and what is seen
+/// of everything that a limit may be is seen up to the largest.
+double within_range(const FreeNumber& number, double limit) {
+  const double largest = std::max(std::abs(number.min), std::abs(number.max));
+  if (!(limit > largest)) return limit;
+  return is_limit(number) && std::isfinite(limit) ? largest
+                                                  : std::numeric_limits<double>::infinity();
+}
+
 /// Whether a place is an axis of which the run holds no signal.
 bool is_unseen_axis(const Evidence& evidence, const std::string& place) {
-  const std::size_t axis = axis_named(place);
+  const std::size_t axis = axis_named(place_of_key(place));
   const std::vector<MeasuredSignal>& signals = evidence.record().signals;
   return axis < kAxisCount &&
          std::none_of(signals.begin(), signals.end(), [&](const MeasuredSignal& s) {
@@ -85,18 +94,19 @@ ExcitationOfRun excitation_of(const DiagnosisCase& of, const Evidence& evidence,
                                                              : std::map<std::size_t, double>{};
   double finest = std::numeric_limits<double>::infinity();  // slip of a period that would show
   for (std::size_t c = 0; c < evidence.replica().channels().size(); ++c)
-    if (is_reading(evidence.replica().channels()[c].kind))
+    if (evidence.replica().channels()[c].kind == SignalKind::deflection)
       finest = std::min(finest, 5 * std::sqrt(2.0) * evidence.noise().channels[c].rms /
                                     of.declared.probe.signal_period);
   if (finest < 1) told.of.push_back({"probe.period_slip", finest, true, "", "", {}});
   std::set<std::string> unseen;
-  for (const auto& [c, limit] : limits) {
+  for (const auto& [c, of_trials] : limits) {
     const Candidate& candidate = of.candidates[c];
     if (is_unseen_axis(evidence, candidate.place)) {
-      unseen.insert(candidate.place);
+      unseen.insert(place_of_key(candidate.place));
       continue;
     }
     const FreeNumber& number = limited_number(of, selection, c);
+    const double limit = within_range(number, of_trials);
     double typical = std::abs(number.typical);
     for (std::size_t i = 0; i < candidate.numbers.size() && typical == 0; ++i)
       typical = std::abs(candidate.numbers[i].typical);
@@ -104,7 +114,7 @@ ExcitationOfRun excitation_of(const DiagnosisCase& of, const Evidence& evidence,
     Excitation e{candidate.name(), limit, excited, "", number.key, {}};
     if (!e.excited) e.program = program_for(candidate.effect);
     if (const auto found = limits_beside.find(c); found != limits_beside.end())
-      e.beside_found = found->second;
+      e.beside_found = within_range(number, found->second);
     if (e.excited || !selection.interrupted) told.of.push_back(std::move(e));
   }
   for (std::size_t i = 0; i < selection.release_limits.size(); ++i) {

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/records/record.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {
@@ -48,9 +49,19 @@ bool is_of_drive(const Candidate& candidate);
 /// is heavy enough (AxisDrive) whatever else is changed.
 Range range_with_a_motor_side(const Machine& declared, const std::string& key, Range range);
 
-/// The candidates of a machine, in the order of the library. Those whose place the record has no
-/// signal of are left out by the caller.
+/// The candidates of a machine, in the order of the library.
 std::vector<Candidate> candidates(const Machine& declared);
+
+/// Those of them that are sought in a record.
+std::vector<Candidate> candidates(const Machine& declared, const Record& record);
+
+/// Whether a record can tell of a candidate, as far as it holds anything of its place; of sensors
+/// other than a probe (on the table, a bar) no more than what any sensor has.
+bool is_sought(const Record& record, const Candidate& candidate);
+
+/// Whether a record without readings holds nothing of a place: of another axis, of a probe, of the
+/// geometry. Where something was read, an axis that stands shows, too. `place`: of a candidate.
+bool holds_nothing_of(const Record& record, const std::string& place);
 
 /// A machine with numbers outside [effects] other than declared, as a hypothesis: the declared
 /// machine, with the effects of `machine` and with a deviation for each of those numbers. Its

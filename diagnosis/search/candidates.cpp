@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "diagnosis/replica/effect_stage.hpp"
 #include "diagnosis/search/candidate.hpp"
@@ -169,6 +170,28 @@ std::vector<Candidate> candidates(const Machine& declared) {
   });
   for (Candidate& c : all) keep_within_travel(declared, c);
   add_deviations(declared, all);
+  return all;
+}
+
+bool holds_nothing_of(const Record& record, const std::string& place) {
+  for (const MeasuredSignal& s : record.signals)
+    if (is_reading(s.kind) || place_of_key(place) == kAxisNames[s.axis]) return false;
+  return true;
+}
+
+bool is_sought(const Record& record, const Candidate& c) {
+  const std::set<std::string> of_any_sensor{"probe_gain",     "cross_talk",  "probe_drift",
+                                            "sample_latency", "clock_drift", "tip_radius"};
+  if (holds_nothing_of(record, c.place)) return false;
+  if (!record.on_table) return true;
+  if (c.place.starts_with("probe")) return of_any_sensor.contains(c.effect);
+  // About one place an axis that turns as it goes looks out of square and of another scale.
+  return !(record.on_table->is_bar() && c.effect == "angular_errors");
+}
+
+std::vector<Candidate> candidates(const Machine& declared, const Record& record) {
+  std::vector<Candidate> all = candidates(declared);
+  std::erase_if(all, [&](const Candidate& c) { return !is_sought(record, c); });
   return all;
 }
 

@@ -11,6 +11,8 @@
 namespace vcnc {
 namespace {
 
+/// Part of a tolerance that is left where the healthy run was fitted.
+constexpr double kFitted = 0.2;
 constexpr double kStep = 0.1;            // of a tolerance, to see what a number does
 constexpr std::size_t kRemembered = 64;  // series
 
@@ -48,7 +50,9 @@ std::vector<FreedNumber> common_numbers(const Machine& healthy) {
   std::vector<FreedNumber> all;
   for (const Parameter& p : parameters(copy)) {
     if (tolerance_in_common(p.key, 1) <= 0) continue;
-    const double value = number_of(healthy, p.key), tolerance = tolerance_in_common(p.key, value);
+    const double value = number_of(healthy, p.key),
+                 tolerance = (healthy.commissioned.empty() ? 1 : kFitted) *
+                             tolerance_in_common(p.key, value);
     if (tolerance <= 0) continue;
     all.push_back({.number = {.key = std::string(kCommon) + p.key,
                               .typical = tolerance,

@@ -6,17 +6,27 @@
 #include <set>
 
 #include "diagnosis/search/screening.hpp"
+#include "diagnosis/search/trial.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {
 namespace {
 
+/// Angles that went so far that the end of what is allowed is near, a turn back.
+void turn_back(std::vector<FreedNumber>& numbers) {
+  constexpr double kFar = 270, kTurn = 360;  // [deg]
+  for (FreedNumber& n : numbers)
+    if (is_phase(n.number) && n.tolerance == 0 && std::abs(n.value) > kFar)
+      n.value = std::remainder(n.value, kTurn);
+}
+
 /// Takes over what a refit found and computes everything at it.
 void settle_from(const Evidence& evidence, FittedMachine& m, const Refit& f) {
-  m.machine = f.machine;
-  for (AddedEffect& a : m.added) adopt(a.numbers, f.live);
+  for (AddedEffect& a : m.added) adopt(a.numbers, f.live), turn_back(a.numbers);
   adopt(m.nuisances.numbers, f.linear);
   adopt(m.nuisances.numbers, f.live);
+  turn_back(m.nuisances.numbers);
+  m.machine = with(with(f.machine, m.numbers()), m.nuisances.numbers);
   m.prediction = evidence.predict(m.machine);
   m.residual = evidence.residual(m.prediction);
   m.columns = f.columns;
@@ -133,8 +143,9 @@ bool leads_the_same_way(const Refit& a, const Refit& b) {
       [&](const FreedNumber& x, const FreedNumber& y) { return !apart(x.value, y.value); });
 }
 
-/// Computes everything where the machine stands.
+/// Computes everything where the machine stands; so do numbers that were begun elsewhere.
 void stay(const Evidence& evidence, FittedMachine& m) {
+  for (AddedEffect& a : m.added) take_values(a.numbers, m.machine);
   m.prediction = evidence.predict(m.machine);
   m.residual = evidence.residual(m.prediction);
   m.columns = columns_of(evidence, m.machine, m.prediction, m.numbers());

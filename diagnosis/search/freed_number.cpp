@@ -44,6 +44,25 @@ constexpr Tolerance kResidues[] = {
     {"effects.Z.", ".thermal_drift.offset_um", 3},
 };
 
+/// The same of what a builder reckons and nobody has measured, before a machine is commissioned.
+constexpr Tolerance kReckonings[] = {
+    {"effects.", ".windup.compliance", 0.06},
+    {"effects.", ".backlash.gap", 0.06},
+    {"effects.", ".weight_imbalance.force", 0.05},
+    {"effects.", ".weight_imbalance.torque", 0.05},
+};
+constexpr double kReckonedAngle = 2;  // of a weight [deg]
+
+double reckoned(const Machine& machine, const std::string& key, double value) {
+  for (const Tolerance& t : kReckonings)
+    if (key.starts_with(t.prefix) && key.find(t.part) != std::string::npos)
+      return t.size * std::abs(value);
+  const bool hangs =
+      key.find(".weight_imbalance.angle_deg") != std::string::npos &&
+      machine.effects.axis[axis_named(place_of_key(key))].get<WeightImbalance>().force != 0;
+  return hangs ? kReckonedAngle : 0;
+}
+
 double tolerance_of(const std::string& key, double value) {
   for (const Tolerance& t : kResidues)
     if (key.starts_with(t.prefix) && key.find(t.part) != std::string::npos) return t.size;
@@ -215,11 +234,15 @@ std::vector<FreedNumber> nuisances(const Machine& declared, Against against) {
     const Deviation* d = deviation_of(declared, p.key);
     const double value = d ? d->value : p.in_unit();
     const Uncertainty* told =
-        against == Against::declaration ? uncertainty_of(declared, p.key) : nullptr;
+        against == Against::healthy_run ? nullptr : uncertainty_of(declared, p.key);
     // A rotor is the same in both runs; what is on a table may be another.
     if (against == Against::healthy_run && is_of_rotor(p.key)) continue;
     if (is_no_lead(declared, p.key)) continue;
-    const double tolerance = told ? told->standard : tolerance_of(p.key, value);
+    const double tolerance =
+        told ? told->standard
+        : against == Against::reckoning
+            ? std::max(reckoned(declared, p.key, value), tolerance_of(p.key, value))
+            : tolerance_of(p.key, value);
     const bool free = told && told->free();
     if (tolerance <= 0 && !free) continue;
     // Counted in what is small, so that differences are taken near the declaration.

@@ -60,8 +60,13 @@ bool is_clamping(const std::string& key);
 /// a wrong scale, and a linear motor has none.
 bool has_a_lead(const Machine& declared, std::size_t axis);
 
-/// What a machine is held against.
-enum class Against { declaration, healthy_run };
+/// What a machine is held against: a declaration that was measured, one that a builder reckoned, or
+/// a run of the same machine.
+enum class Against { declaration, reckoning, healthy_run };
+
+/// `other` with what `fitted` has otherwise than declared, but for what it says itself: numbers of
+/// a file that are as declared.
+Machine with_fitted(Machine other, const Machine& declared, const Machine& fitted);
 
 /// Declared numbers that are never exact, with their tolerances (standard deviations):
 ///
@@ -71,17 +76,13 @@ enum class Against { declaration, healthy_run };
 ///   damping of declared windup                 50 %
 ///   where the piece was clamped                free (100 um, 500 urad); reported above 5 um
 ///   scale of a linear axis                     1.5 ppm
-///   lead of a screw                            30 ppm, as of 3 K; where the loop is closed with
-///   the
-///                                              load
+///   lead of a screw                            30 ppm, as of 3 K, its loop closed with the load
 ///   size of gauge and ball                     1 um; between two runs, too: a steel ring of 50 mm
 ///                                              in diameter grows by 0.6 um in 1 K
 ///   drift of a linear axis                     3 um with 1200 s: 0.15 um/min
+///   only where they were reckoned:             6 % compliance and play, 5 % weight, 2 deg its
+///   angle
 ///
-/// `other` with what `fitted` has otherwise than declared, but for what it says itself: numbers of
-/// a file that are as declared.
-Machine with_fitted(Machine other, const Machine& declared, const Machine& fitted);
-
 /// Against the declaration, those that the machine lists as uncertain are as uncertain as it says:
 /// free, of another tolerance, or exact and no nuisance at all. Of a change between two runs of one
 /// machine that says nothing. Only numbers that can show in the run matter; the others stay at

@@ -165,15 +165,23 @@ Series periodogram(const std::vector<LapNoise>& laps) {
   return power;
 }
 
-double running_median(const Series& power, std::size_t at) {
-  constexpr std::size_t kReach = 60;
-  const std::size_t begin = at > kReach ? at - kReach : 1;
-  const std::size_t end = std::min(power.size(), at + kReach + 1);
+/// Of bins [begin, end); of none nought.
+double median_of(const Series& power, std::size_t begin, std::size_t end) {
+  if (begin >= end) return 0;
   Series part(power.begin() + static_cast<std::ptrdiff_t>(begin),
               power.begin() + static_cast<std::ptrdiff_t>(end));
   const auto middle = part.begin() + static_cast<std::ptrdiff_t>(part.size() / 2);
   std::nth_element(part.begin(), middle, part.end());
   return *middle;
+}
+
+/// What a line stands out of: the usual power about it, or that of a little below in frequency,
+/// where noise that falls steeply is louder and what seems to stand out is a chance of it.
+double power_about(const Series& power, std::size_t at) {
+  constexpr std::size_t kReach = 60, kNear = 20, kOfLine = 5;
+  const auto before = [&](std::size_t bins) { return at > bins ? at - bins : 1; };
+  return std::max(median_of(power, before(kReach), std::min(power.size(), at + kReach + 1)),
+                  median_of(power, before(kNear), before(kOfLine)));
 }
 
 /// Those of an amplitude of more than `least` [SI].
@@ -194,15 +202,15 @@ std::vector<NoiseLine> find_lines(const ComparedChannel& channel, const std::vec
                           static_cast<double>(laps.size());
   for (std::size_t k = kLowest; k + 1 < power.size(); ++k) {
     if (power[k] < power[k - 1] || power[k] <= power[k + 1]) continue;
-    const double median = running_median(power, k);
-    if (median <= 0 || power[k] < kStrength * median) continue;
+    const double about = power_about(power, k);
+    if (about <= 0 || power[k] < kStrength * about) continue;
     // Vertex of the parabola through the logarithms of three bins.
     const double l = std::log(power[k - 1]), c = std::log(power[k]), r = std::log(power[k + 1]);
     const double shift = 0.5 * (l - r) / (l - 2 * c + r);
     const double frequency = (static_cast<double>(k) + shift) * bin;
     // A sine of amplitude A has |X|^2/n = n (A/4)^2 under this window.
     const double amplitude = 4 * std::sqrt(power[k] / static_cast<double>(laps.size()) / mean_lap);
-    if (amplitude > least) lines.push_back({channel, frequency, power[k] / median, amplitude});
+    if (amplitude > least) lines.push_back({channel, frequency, power[k] / about, amplitude});
   }
   std::sort(lines.begin(), lines.end(),
             [](const NoiseLine& x, const NoiseLine& y) { return x.strength > y.strength; });

@@ -18,7 +18,8 @@ struct WeightImbalance {
       .brief = "a counterweight that does not fit, or a rotary axis whose centre of mass is off",
       .equation = R"(linear  F = G,   rotary  F = G sin(q + q_0)
 F: added to the force on the load, positive along the axis; G: weight out of balance [N], or
-m g times the lever of the centre of mass [N m]; q_0: its angle below the horizontal [rad])",
+m g times the lever of the centre of mass [N m]; q_0: angle of the lever from the vertical where the
+axis counts nought [rad]. G > 0: it stands upright at q = -q_0 and would fall; G < 0: it hangs there)",
       .validity =
           R"(Rigid bodies, the axis of rotation horizontal (as A); G carries no inertia of its own. When the
 drive starts its integrator is empty: the axis first gives way until it has taken G up.)",
@@ -43,7 +44,9 @@ per turn. Position is right once the integrator holds it; with wind-up a static 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit, bool rotary) {
     visit(rotary ? "torque_Nm" : "force_N", p.force, rotary ? unit::newton_m : unit::newton,
-          Range{-1e5, 1e5}, rotary ? "largest moment of the weight" : "weight out of balance");
+          Range{-1e5, 1e5},
+          rotary ? "largest moment of the weight, negative where it hangs at position 0"
+                 : "weight out of balance");
     if (rotary)
       visit("angle_deg", p.angle, unit::deg, Range{-360, 360},
             "added to the position: the moment vanishes where the sum is 0");
