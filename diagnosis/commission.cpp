@@ -93,6 +93,8 @@ class Commissioner {
 
   void fit_axis(std::size_t axis) {
     const std::string place(kAxisNames[axis]);
+    // What goes along was linear about the machine before the axis before this one.
+    converge_anew(machine_.evidence, machine_.now);
     FrictionFit friction(machine_, place);
     const auto fit_gains = [&] {
       fit_best_of(machine_, machine_.the(kGains, place), place, &friction,
@@ -107,6 +109,7 @@ class Commissioner {
       friction.fit_anew(found);
       fit_gains();
     }
+    converge_anew(machine_.evidence, machine_.now);
     friction.fit_part_of_motor();
     machine_.rest();
   }

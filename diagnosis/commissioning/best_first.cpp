@@ -59,6 +59,8 @@ std::vector<std::size_t> promising(const FittedMachine& now,
 
 void fit_best_of(MachineInFit& in, std::vector<std::size_t> left, const std::string& place,
                  FrictionFit* friction, const std::function<bool()>& go_on) {
+  constexpr int kAnew = 3;  // gains beside which the friction is fitted anew: the most promising
+  int anew = 0;
   while (!left.empty() && go_on()) {
     std::vector<double> promise(left.size());
     in.evidence.each_together(left.size(), [&](std::size_t i) {
@@ -77,7 +79,7 @@ void fit_best_of(MachineInFit& in, std::vector<std::size_t> left, const std::str
     if (!in.gains_enough(in.now, better, place, kShareOfLeft)) return;
     std::erase(left, few[best]);
     if (in.is_as_declared(better)) {
-      if (friction) friction->fit_with(few[best]);
+      if (friction && anew++ < kAnew) friction->fit_with(few[best]);
     } else if (!in.stands_for_force(better)) {
       in.accept(std::move(better), place, told(in.candidates[few[best]]));
     }

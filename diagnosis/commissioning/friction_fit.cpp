@@ -1,6 +1,7 @@
 #include "diagnosis/commissioning/friction_fit.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 #include "diagnosis/search/refit.hpp"
 
@@ -24,6 +25,12 @@ const std::vector<FrictionLaw> kFrictionLaws{
     {"dry, viscous and break-away friction with pre-sliding",
      {"coulomb", "viscous", "stribeck", "presliding"}}};
 
+std::vector<std::size_t> all_laws() {
+  std::vector<std::size_t> all(kFrictionLaws.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return all;
+}
+
 /// Whether a fit has left numbers where they were: what was gained is not theirs.
 bool nothing_moved(const Machine& before, const std::vector<FreedNumber>& now) {
   return std::all_of(now.begin(), now.end(), [&](const FreedNumber& n) {
@@ -37,8 +44,8 @@ FrictionFit::FrictionFit(MachineInFit& machine, std::string place)
     : machine_(machine), place_(std::move(place)), before_(machine.now) {}
 
 void FrictionFit::fit() {
-  auto [best, law] = with_law({});
-  if (!law.empty()) machine_.accept(std::move(best), place_, law);
+  Fitted best = with_best(all_laws());
+  if (best.law) machine_.accept(std::move(best.machine), place_, kFrictionLaws[*best.law].name);
 }
 
 void FrictionFit::fit_anew(const std::vector<std::size_t>& since) {
@@ -57,40 +64,37 @@ void FrictionFit::fit_anew(const std::vector<std::size_t>& since) {
     for (const FreeNumber& n : machine_.candidates[c].numbers)
       move_number(machine, n.key, number_of(machine_.now.machine, n.key));
   machine = with(machine, along.numbers);
-  auto [best, law] = with_law({});
-  if (!law.empty() && machine_.gains_enough(machine_.now, best, place_))
-    machine_.accept(std::move(best), place_, law + " anew");
+  Fitted best = with_best(all_laws());
+  if (!best.law || !machine_.gains_enough(machine_.now, best.machine, place_)) return;
+  machine_.accept(std::move(best.machine), place_, kFrictionLaws[*best.law].name + " anew");
 }
 
-/// The axis as it was before its friction was fitted, with the law that does best and with what
-/// is fitted beside it; without a name where none does anything.
-std::pair<FittedMachine, std::string> FrictionFit::with_law(
-    const std::vector<std::size_t>& beside) const {
-  const FittedMachine& from = before_;
-  std::vector<FittedMachine> trials(kFrictionLaws.size(), from);
+FrictionFit::Fitted FrictionFit::with_best(const std::vector<std::size_t>& laws,
+                                           const std::vector<std::size_t>& beside) const {
+  std::vector<Fitted> trials(laws.size(), Fitted{before_, {}});
   machine_.evidence.each_together(trials.size(), [&](std::size_t i) {
-    std::vector<std::size_t> law = machine_.the(kFrictionLaws[i].effects, place_);
+    std::vector<std::size_t> law = machine_.the(kFrictionLaws[laws[i]].effects, place_);
     if (law.empty()) return;
     law.insert(law.end(), beside.begin(), beside.end());
-    trials[i] = machine_.with_candidates(from, law);
-    converge(machine_.evidence, trials[i]);
-    if (nothing_moved(from.machine, trials[i].numbers())) trials[i] = from;
+    FittedMachine fitted = machine_.with_candidates(before_, law);
+    converge(machine_.evidence, fitted);
+    if (!nothing_moved(before_.machine, fitted.numbers())) trials[i] = {std::move(fitted), laws[i]};
   });
-  const FittedMachine* best = &from;
-  for (const FittedMachine& trial : trials)
-    if (machine_.gains_enough(*best, trial, place_)) best = &trial;
-  if (best == &from) return {};
-  const auto law = static_cast<std::size_t>(best - trials.data());
-  return {std::move(trials[law]), kFrictionLaws[law].name};
+  Fitted best{before_, {}};
+  for (Fitted& trial : trials)
+    if (trial.law && machine_.gains_enough(best.machine, trial.machine, place_))
+      best = std::move(trial);
+  return best;
 }
 
 void FrictionFit::fit_with(std::size_t gain) {
   if (!machine_.candidates[gain].of_loops) return;
-  auto [better, law] = with_law({gain});
-  if (law.empty() || !machine_.gains_enough(machine_.now, better, place_, kShareOfLeft) ||
-      machine_.is_as_declared(better) || machine_.stands_for_force(better))
+  Fitted better = with_best(all_laws(), {gain});
+  if (!better.law || !machine_.gains_enough(machine_.now, better.machine, place_, kShareOfLeft) ||
+      machine_.is_as_declared(better.machine) || machine_.stands_for_force(better.machine))
     return;
-  machine_.accept(std::move(better), place_, law + " with " + told(machine_.candidates[gain]));
+  machine_.accept(std::move(better.machine), place_,
+                  kFrictionLaws[*better.law].name + " with " + told(machine_.candidates[gain]));
 }
 
 void FrictionFit::fit_part_of_motor() {
@@ -101,9 +105,15 @@ void FrictionFit::fit_part_of_motor() {
   std::vector<double> shares{0.1, 0.35};
   const std::string level = machine_.candidates[motor[0]].numbers.front().key;
   if (number_of(machine_.now.machine, level) > 0) shares.push_back(0);
+  machine_.rest();
+  std::vector<std::size_t> both_sides;
+  for (const std::size_t c : machine_.the(kFrictionLaws.back().effects, place_))
+    if (number_of(machine_.now.machine, machine_.candidates[c].numbers.front().key) != 0)
+      both_sides.push_back(c);
+  both_sides.push_back(motor[0]);
   std::vector<FittedMachine> better(shares.size());
   machine_.evidence.each_together(better.size(), [&](std::size_t i) {
-    better[i] = machine_.with_candidates(machine_.now, motor);
+    better[i] = machine_.with_candidates(machine_.now, both_sides);
     move_to_motor(better[i], shares[i]);
     converge(machine_.evidence, better[i]);
   });

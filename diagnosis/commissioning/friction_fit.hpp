@@ -7,8 +7,8 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "diagnosis/commissioning/machine_in_fit.hpp"
@@ -29,7 +29,13 @@ class FrictionFit {
   void fit_part_of_motor();
 
  private:
-  std::pair<FittedMachine, std::string> with_law(const std::vector<std::size_t>& beside) const;
+  /// The best of some laws fitted to the axis as it was; of none without a law.
+  struct Fitted {
+    FittedMachine machine;
+    std::optional<std::size_t> law;
+  };
+  Fitted with_best(const std::vector<std::size_t>& laws,
+                   const std::vector<std::size_t>& beside = {}) const;
   void move_to_motor(FittedMachine& m, double share) const;
 
   MachineInFit& machine_;

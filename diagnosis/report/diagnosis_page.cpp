@@ -79,7 +79,9 @@ std::string effect_box(const FoundEffect& e, const Diagnosis& d) {
   text += "</table><p>";
   if (std::isfinite(e.gain))
     text += fmt::format("Chi-square gained on what was held out: {:.3g}. ", e.gain);
-  text += fmt::format("Contour error: {:+.3g} µm rms.</p>\n", e.contour_error_um);
+  if (e.contour_error_um != 0)
+    text += fmt::format("Contour error: {:+.3g} µm rms.", e.contour_error_um);
+  text += "</p>\n";
   if (!e.class_with.empty()) {
     std::string others;
     for (const std::string& c : e.class_with) others += (others.empty() ? "" : ", ") + escaped(c);

@@ -124,11 +124,12 @@ std::string to_text(const Diagnosis& d) {
               ? separator + with_interval(n) + ", " + against_declared(n, d)
               : fmt::format("{}{} = {}", separator, short_key(n.key, e.name), with_change(n, d));
     }
-    text += fmt::format("  {}{}: {}; contour error {:+.3g} um rms\n", name_of(e),
-                        e.minor         ? " (minor)"
-                        : e.acquisition ? " (of the measurement)"
-                                        : "",
-                        numbers, e.contour_error_um);
+    const char* kind = e.minor ? " (minor)" : e.acquisition ? " (of the measurement)" : "";
+    // A joint makes no contour.
+    const std::string contour =
+        e.contour_error_um == 0 ? ""
+                                : fmt::format("; contour error {:+.3g} um rms", e.contour_error_um);
+    text += fmt::format("  {}{}: {}{}\n", name_of(e), kind, numbers, contour);
     if (!e.class_with.empty()) {
       std::string others;
       for (const std::string& c : e.class_with) others += (others.empty() ? "" : ", ") + c;

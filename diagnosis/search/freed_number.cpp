@@ -51,12 +51,14 @@ constexpr Tolerance kReckonings[] = {
     {"effects.", ".weight_imbalance.force", 0.05},
     {"effects.", ".weight_imbalance.torque", 0.05},
 };
-constexpr double kReckonedAngle = 2;  // of a weight [deg]
+constexpr double kReckonedAngle = 2;   // of a weight [deg]
+constexpr double kReckonedScale = 15;  // of a linear axis, a screw above all [ppm]
 
 double reckoned(const Machine& machine, const std::string& key, double value) {
   for (const Tolerance& t : kReckonings)
     if (key.starts_with(t.prefix) && key.find(t.part) != std::string::npos)
       return t.size * std::abs(value);
+  if (key.find(".scale_error.error_ppm") != std::string::npos) return kReckonedScale;
   const bool hangs =
       key.find(".weight_imbalance.angle_deg") != std::string::npos &&
       machine.effects.axis[axis_named(place_of_key(key))].get<WeightImbalance>().force != 0;

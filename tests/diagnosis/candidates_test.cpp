@@ -47,6 +47,62 @@ TEST(Candidates, AmplitudesActAndShapesAloneDoNot) {
   EXPECT_GT(shapes, 80u);
 }
 
+std::set<std::string> sought_in(const Record& record) {
+  std::set<std::string> names;
+  for (const Candidate& c : candidates(machine(), record)) names.insert(c.name());
+  return names;
+}
+
+TEST(Candidates, OfARecordAreWhatItCanTellOf) {
+  Record joint;
+  for (const SignalKind kind : {SignalKind::command, SignalKind::position, SignalKind::force})
+    joint.signals.push_back({kind, kC, "", {}, 0});
+  for (const std::string& name : sought_in(joint))
+    EXPECT_TRUE(name.starts_with("C.") || name.starts_with("axes.C.")) << name;
+  EXPECT_TRUE(sought_in(joint).contains("C.kv_error"));
+
+  Record sensor = joint;
+  sensor.signals.push_back({SignalKind::tool_position, 0, "", {}, 0});
+  sensor.on_table = OnTable{};
+  const std::set<std::string> of_sensor = sought_in(sensor);
+  EXPECT_TRUE(of_sensor.contains("geometry.squareness"));
+  EXPECT_TRUE(of_sensor.contains("probe.sample_latency"));
+  EXPECT_FALSE(of_sensor.contains("probe.signal_phase"));
+  EXPECT_FALSE(of_sensor.contains("probe.stylus_bending"));
+  EXPECT_FALSE(of_sensor.contains("probe.moving_mass_g.deviation"));
+
+  Record probe = joint;
+  probe.signals.push_back({SignalKind::deflection, 0, "", {}, 0});
+  EXPECT_EQ(sought_in(probe).size(), candidates(machine()).size());
+}
+
+TEST(DeclaredNumbers, ReckonedOnesMayBeFurtherOffThanMeasuredOnes) {
+  Machine declared = machine();
+  declared.effects.axis[kC].get<WeightImbalance>() = {.force = -20, .angle = 0};
+  declared.effects.axis[kC].get<Windup>().compliance = 60e-6;
+  const auto tolerance = [&](const std::string& key, Against against) {
+    for (const FreedNumber& n : nuisances(declared, against))
+      if (n.number.key == key) return n.tolerance;
+    return 0.0;
+  };
+  const std::string weight = "effects.C.weight_imbalance.torque_Nm",
+                    angle = "effects.C.weight_imbalance.angle_deg",
+                    compliance = "effects.C.windup.compliance_urad_per_Nm",
+                    scale = "effects.X.scale_error.error_ppm";
+  EXPECT_NEAR(tolerance(weight, Against::reckoning), 1, 1e-12);
+  EXPECT_NEAR(tolerance(angle, Against::reckoning), 2, 1e-12);
+  EXPECT_NEAR(tolerance(compliance, Against::reckoning), 3.6, 1e-9);
+  EXPECT_NEAR(tolerance(scale, Against::reckoning), 15, 1e-12);
+  for (const Against exact : {Against::declaration, Against::healthy_run}) {
+    EXPECT_EQ(tolerance(weight, exact), 0);
+    EXPECT_EQ(tolerance(angle, exact), 0);
+    EXPECT_NEAR(tolerance(compliance, exact), 1.2, 1e-9);
+    EXPECT_NEAR(tolerance(scale, exact), 1.5, 1e-12);
+  }
+  declared.effects.axis[kC].get<WeightImbalance>() = {};
+  EXPECT_EQ(tolerance(angle, Against::reckoning), 0);
+}
+
 TEST(Candidates, HaveEveryEffectThatCanBePredicted) {
   std::set<std::string> named;
   Machine declared = machine();

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
 #include "diagnosis/search/freed_number.hpp"
@@ -20,7 +22,11 @@ Commissioning commissioned_x(const Effects& effects, const Declared&... declared
   MachineReplica replica(run.record, run.declared, run.piece);
   std::vector<Candidate> all = candidates(run.declared);
   std::erase_if(all, [](const Candidate& c) { return c.place != "X"; });
-  return commission({run.record, replica, run.declared, all});
+  Commissioning c = commission({run.record, replica, run.declared, all});
+  for (const FittedNumber& n : c.numbers)
+    EXPECT_NEAR(number_of(c.machine, n.key), n.value, 1e-6 * std::abs(n.value))
+        << n.key << ": what is told is in the file";
+  return c;
 }
 
 /// The whole machine, declared without friction and with a position gain that is too high.
@@ -59,6 +65,20 @@ TEST(Commission, TellsFrictionOfTheMotorFromThatOfTheLoad) {
   const Commissioning c = commissioned_x(effects, windup);
   EXPECT_NEAR(number_of(c.machine, "effects.X.coulomb.level_N"), 180, 0.05 * 180);
   EXPECT_NEAR(number_of(c.machine, "effects.X.motor_friction.level_N"), 120, 0.05 * 120);
+}
+
+/// A builder knows how hard his motor turns, and not on what bristles it rests.
+TEST(Commission, FindsTheBristlesOfADeclaredMotorFriction) {
+  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
+  Effects effects;
+  const Windup windup = Windup::nominal(false);
+  effects.axis[kX].get<Windup>() = windup;
+  effects.axis[kX].get<Coulomb>().level = 60;
+  effects.axis[kX].get<MotorFriction>() = {.level = 180, .viscous = 0, .stiffness = 3e7};
+  const Commissioning c = commissioned_x(effects, windup, MotorFriction{.level = 170});
+  EXPECT_NEAR(number_of(c.machine, "effects.X.coulomb.level_N"), 60, 0.05 * 60);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.motor_friction.level_N"), 180, 0.02 * 180);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.motor_friction.stiffness_N_per_um"), 30, 3);
 }
 
 /// A screw has waves and a motor has ripple when they are healthy, and a hose pulls.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <random>
 
 #include "diagnosis/search/contest.hpp"
 #include "diagnosis/search/intervals.hpp"
@@ -56,6 +57,29 @@ TEST(NoiseAudit, TellsFrequencyAndAmplitudeOfWhatDoesNotRepeat) {
   toy::measure(quiet, Machine(), 6);
   toy::ToyReplica of_quiet(quiet);
   EXPECT_TRUE(Evidence(quiet, of_quiet, Machine()).noise().lines.empty());
+}
+
+// Its spectrum falls by f^4; where it is low its chance stands high over what is a little above.
+TEST(NoiseAudit, NoiseThatFallsSteeplyHasNoLines) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    Record record = toy::commands(4096, 4);
+    toy::measure(record, Machine(), 5);
+    std::mt19937 generator(seed);
+    std::normal_distribution<double> white;
+    for (MeasuredSignal& s : record.signals) {
+      if (s.kind != SignalKind::deflection) continue;
+      double once = 0, twice = 0;
+      for (double& v : s.value) {
+        once = 0.98 * once + white(generator);
+        twice = 0.98 * twice + once;
+        v += 1e-9 * twice;
+      }
+    }
+    toy::ToyReplica replica(record);
+    const Evidence evidence(record, replica, Machine());
+    EXPECT_TRUE(evidence.noise().lines.empty())
+        << seed << ": " << evidence.noise().lines.front().frequency << " Hz";
+  }
 }
 
 TEST(Selection, TwoWavesOfOneLengthTakeEachOtherBack) {
