@@ -1,7 +1,6 @@
 #include "diagnosis/commissioning/friction_fit.hpp"
 
 #include <algorithm>
-#include <numeric>
 
 #include "diagnosis/search/refit.hpp"
 
@@ -25,12 +24,6 @@ const std::vector<FrictionLaw> kFrictionLaws{
     {"dry, viscous and break-away friction with pre-sliding",
      {"coulomb", "viscous", "stribeck", "presliding"}}};
 
-std::vector<std::size_t> all_laws() {
-  std::vector<std::size_t> all(kFrictionLaws.size());
-  std::iota(all.begin(), all.end(), std::size_t{0});
-  return all;
-}
-
 /// Whether a fit has left numbers where they were: what was gained is not theirs.
 bool nothing_moved(const Machine& before, const std::vector<FreedNumber>& now) {
   return std::all_of(now.begin(), now.end(), [&](const FreedNumber& n) {
@@ -44,7 +37,7 @@ FrictionFit::FrictionFit(MachineInFit& machine, std::string place)
     : machine_(machine), place_(std::move(place)), before_(machine.now) {}
 
 void FrictionFit::fit() {
-  Fitted best = with_best(all_laws());
+  Fitted best = with_best_law();
   if (best.law) machine_.accept(std::move(best.machine), place_, kFrictionLaws[*best.law].name);
 }
 
@@ -64,21 +57,20 @@ void FrictionFit::fit_anew(const std::vector<std::size_t>& since) {
     for (const FreeNumber& n : machine_.candidates[c].numbers)
       move_number(machine, n.key, number_of(machine_.now.machine, n.key));
   machine = with(machine, along.numbers);
-  Fitted best = with_best(all_laws());
+  Fitted best = with_best_law();
   if (!best.law || !machine_.gains_enough(machine_.now, best.machine, place_)) return;
   machine_.accept(std::move(best.machine), place_, kFrictionLaws[*best.law].name + " anew");
 }
 
-FrictionFit::Fitted FrictionFit::with_best(const std::vector<std::size_t>& laws,
-                                           const std::vector<std::size_t>& beside) const {
-  std::vector<Fitted> trials(laws.size(), Fitted{before_, {}});
+FrictionFit::Fitted FrictionFit::with_best_law(const std::vector<std::size_t>& beside) const {
+  std::vector<Fitted> trials(kFrictionLaws.size(), Fitted{before_, {}});
   machine_.evidence.each_together(trials.size(), [&](std::size_t i) {
-    std::vector<std::size_t> law = machine_.the(kFrictionLaws[laws[i]].effects, place_);
+    std::vector<std::size_t> law = machine_.the(kFrictionLaws[i].effects, place_);
     if (law.empty()) return;
     law.insert(law.end(), beside.begin(), beside.end());
     FittedMachine fitted = machine_.with_candidates(before_, law);
     converge(machine_.evidence, fitted);
-    if (!nothing_moved(before_.machine, fitted.numbers())) trials[i] = {std::move(fitted), laws[i]};
+    if (!nothing_moved(before_.machine, fitted.numbers())) trials[i] = {std::move(fitted), i};
   });
   Fitted best{before_, {}};
   for (Fitted& trial : trials)
@@ -89,7 +81,7 @@ FrictionFit::Fitted FrictionFit::with_best(const std::vector<std::size_t>& laws,
 
 void FrictionFit::fit_with(std::size_t gain) {
   if (!machine_.candidates[gain].of_loops) return;
-  Fitted better = with_best(all_laws(), {gain});
+  Fitted better = with_best_law({gain});
   if (!better.law || !machine_.gains_enough(machine_.now, better.machine, place_, kShareOfLeft) ||
       machine_.is_as_declared(better.machine) || machine_.stands_for_force(better.machine))
     return;

@@ -29,13 +29,13 @@ class FrictionFit {
   void fit_part_of_motor();
 
  private:
-  /// The best of some laws fitted to the axis as it was; of none without a law.
+  /// The axis as it was before, with the law that does best there; without one where none does
+  /// anything.
   struct Fitted {
     FittedMachine machine;
     std::optional<std::size_t> law;
   };
-  Fitted with_best(const std::vector<std::size_t>& laws,
-                   const std::vector<std::size_t>& beside = {}) const;
+  Fitted with_best_law(const std::vector<std::size_t>& beside = {}) const;
   void move_to_motor(FittedMachine& m, double share) const;
 
   MachineInFit& machine_;
