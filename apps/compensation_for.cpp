@@ -269,7 +269,8 @@ double lag(const Work& w, std::size_t axis) {
                                   .force_limit = 0};
   axis_chain<ServoPort>(w.machine.effects, axis, 0).step(servo, {});
   const AxisEffects& e = w.effects(axis);
-  return e.get<CommandDelay>().delay + e.get<BusLatency>().cycles * kCycle +
+  const double seen_late = w.motor_encoder(axis) ? 0 : e.get<LoadEncoderLatency>().latency;
+  return -seen_late + e.get<CommandDelay>().delay + e.get<BusLatency>().cycles * kCycle +
          (1 - servo.velocity_ff) / servo.kv;
 }
 
@@ -289,6 +290,12 @@ Verdict lead(Work& w, std::size_t axis) {
   if (std::abs(given) < kNothing)
     return no("makes no lag at these gains; the drive has to be set right");
   return by(fmt::format("lead {:.4g} us", given * 1e6));
+}
+
+/// The loop lets the axis run ahead until what it sees is where it should be.
+Verdict load_encoder_latency(Work& w, std::size_t axis) {
+  if (w.motor_encoder(axis)) return no("the loop does not use that measuring system");
+  return lead(w, axis);
 }
 
 Verdict friction(Work& w, std::size_t axis) {
@@ -347,6 +354,7 @@ constexpr Answer kAnswers[]{
     {"bus_latency", lead},
     {"velocity_ff_error", lead},
     {"kv_error", lead},
+    {"load_encoder_latency", load_encoder_latency},
     {"coulomb", friction},
     {"stribeck", friction},
     {"motor_friction", friction},

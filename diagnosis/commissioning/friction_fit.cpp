@@ -94,7 +94,7 @@ void FrictionFit::fit_part_of_motor() {
   if (motor.empty()) return;
   // It does little that friction of the load does not, so no way leads there from none of it. What
   // is declared may lack its bristles alone.
-  std::vector<double> shares{0.1, 0.35};
+  std::vector<double> shares{0.1, 0.35, 0.65};
   const std::string level = machine_.candidates[motor[0]].numbers.front().key;
   if (number_of(machine_.now.machine, level) > 0) shares.push_back(0);
   machine_.rest();

@@ -68,6 +68,7 @@ std::vector<Law> LawColumns::all() const {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     if (!moves_[i]) continue;
     const auto add = [&](Point point, Covariate over, std::size_t of, Covariate times) {
+      if (!acts(i, point)) return;
       Law law;
       law.axis = static_cast<Law::OfAxis>(i);
       law.point = point;
@@ -106,7 +107,8 @@ std::vector<Law> LawColumns::all() const {
 std::vector<Law> LawColumns::jumps(const std::function<double(const Law&)>& gain) const {
   std::vector<Law> all;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
-    if (moves_[i]) all.push_back(jump(i, Law::Point::displacement, 1));
+    if (moves_[i] && acts(i, Law::Point::displacement))
+      all.push_back(jump(i, Law::Point::displacement, 1));
     if (is_read(i)) all.push_back(jump(i, Law::Point::reading, 1));
   }
   parallel_for(all.size(), [&](std::size_t i) {
@@ -139,6 +141,17 @@ std::vector<Law> LawColumns::jumps(const std::function<double(const Law&)>& gain
     all[i] = at(best.gain > 0 ? best.sample : 1);
   });
   return all;
+}
+
+bool LawColumns::acts(std::size_t axis, Law::Point point) const {
+  constexpr double kSeen = 0.01;                   // of a displacement
+  const double lever = is_rotary(axis) ? 0.1 : 1;  // [m/rad]
+  if (point != Law::Point::displacement) return true;
+  const SeriesOfChannels& seen = responses_[axis].displacement;
+  return std::any_of(seen.begin(), seen.end(), [&](const Series& channel) {
+    return std::any_of(channel.begin(), channel.end(),
+                       [&](double part) { return std::abs(part) > kSeen * lever; });
+  });
 }
 
 bool LawColumns::is_read(std::size_t component) const {

@@ -50,6 +50,9 @@ class LawColumns {
   const Course& course(Law::OfAxis axis) const { return courses_[static_cast<std::size_t>(axis)]; }
   double covariate(Covariate c, Law::OfAxis axis, std::size_t k) const;
   std::vector<double> even_knots(const Law& law) const;
+  /// Whether the channels see a displacement of an axis as more than a trace of it; so they do a
+  /// force.
+  bool acts(std::size_t axis, Law::Point point) const;
   bool is_read(std::size_t component) const;
   Law jump(std::size_t axis, Law::Point point, std::size_t sample) const;
   Response response_of(std::size_t i) const;

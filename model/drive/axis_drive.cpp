@@ -237,7 +237,7 @@ Real AxisDriveOf<Real>::encoder(ServoParams::Feedback side) {
   if (encoder_shift_ != 0) position += encoder_shift_;
   counting_.each_active([&](Chain<EncoderPort>& chain, std::size_t i) {
     EncoderPort::Signal<double> signal{lane(position, i)};
-    chain.step(signal, {of_load});
+    chain.step(signal, {of_load, lane(v_load_, i), lane(a_load_, i)});
     set_lane(position, i, signal.position);
   });
   return position;

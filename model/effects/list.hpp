@@ -44,6 +44,7 @@
 #include "model/effects/lateral_play.hpp"
 #include "model/effects/lead_error.hpp"
 #include "model/effects/load_encoder_error.hpp"
+#include "model/effects/load_encoder_latency.hpp"
 #include "model/effects/load_play.hpp"
 #include "model/effects/lost_motion.hpp"
 #include "model/effects/mains_hum.hpp"
@@ -102,8 +103,8 @@ using AllEffects = EffectList<
     BusLoss, BusLatency, BusJitter,
     // servo and encoder
     CommandDelay, KvError, VelocityFfError, AccelerationFfError, IntegralTimeError,
-    VelocityGainError, CurrentLag, TorqueLimit, LoadEncoderError, EncoderEccentricity,
-    EncoderSubdivision, EncoderQuantisation,
+    VelocityGainError, CurrentLag, TorqueLimit, LoadEncoderLatency, LoadEncoderError,
+    EncoderEccentricity, EncoderSubdivision, EncoderQuantisation,
     // force of the motor
     TorqueConstantError, TorqueRipple, Cogging,
     // transmission

@@ -132,7 +132,8 @@ struct EncoderPort {
   };
   template <class T>
   struct Context {
-    bool of_load{};  ///< the measuring system on the load; else that on the motor
+    bool of_load{};                ///< the measuring system on the load; else that on the motor
+    T velocity{}, acceleration{};  ///< of the load
   };
 };
 

@@ -96,10 +96,12 @@ TEST_P(ReplicaContract, ReproducesTheWholeMachine) {
   EXPECT_LT(of(full, deflection).rms, 1 * nm);
   EXPECT_LT(of(full, deflection).largest, 20 * nm);
   // The drift's ring of samples is coarser, which shows while the ball touches the piece first.
-  // Where the ball is slow the mean over 20 ms holds some of the signals' error itself.
-  const double coarse = GetParam() == "clock_drift"         ? 0.08
-                        : GetParam().starts_with("signal_") ? 0.03
-                                                            : 0.02;
+  // Where the ball is slow the mean over 20 ms holds some of the signals' error itself; a loop
+  // closed on what is read late answers jumps of the acceleration.
+  const std::string effect = GetParam();
+  const double coarse = effect == "clock_drift"                                             ? 0.08
+                        : effect.starts_with("signal_") || effect == "load_encoder_latency" ? 0.03
+                                                                                            : 0.02;
   const double change = of(replica.predict(run.declared), deflection).rms;
   EXPECT_LT(of(quick, deflection).rms, 0.1 * nm + coarse * change);
 }

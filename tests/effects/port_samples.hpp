@@ -141,7 +141,10 @@ struct PortSamples<EncoderPort> {
     f(s.position, position_span(rotary));
   }
   template <class C, class F>
-  static void context(C&, F&&, bool) {}
+  static void context(C& c, F&& f, bool rotary) {
+    f(c.velocity, velocity_span(rotary));
+    f(c.acceleration, within(rotary ? 30 : 4, 0));
+  }
 };
 
 template <>

@@ -480,6 +480,33 @@ TEST(MotorFriction, OfOneMassIsThatOfTheLoad) {
   }
 }
 
+/// What is counted late is where the load was. A loop closed on it goes ahead until
+/// Kv (x_c - x + t_d x') + x_c' = x': by t_d x_c'/(1 + b s), b = 1/Kv - t_d.
+TEST(LoadEncoderLatency, CountsWhereTheLoadWas) {
+  constexpr std::size_t kSteps = 8;
+  const double latency = kSteps * kDriveLoopTime, w = 2 * kPi, amplitude = 0.05;
+  for (const auto side : {ServoParams::Feedback::motor, ServoParams::Feedback::load}) {
+    AxisParams params = axis();
+    params.servo.feedback = side;
+    AxisDrive drive(params, only(LoadEncoderLatency{latency})), even(params);
+    for (int k = 1; k <= 3000; ++k) {
+      const double t = k * kCycle;
+      const AxisSetpoint target{amplitude * (1 - std::cos(w * t)), amplitude * w * std::sin(w * t)};
+      const AxisCycle cycle = drive.follow(target), without = even.follow(target);
+      if (k < 1000) continue;
+      const double load = cycle.truth.back();
+      const double way = cycle.truth[kDriveLoopSteps - 1 - kSteps] - load;
+      const double next_term = std::pow(latency * w, 3) / 6 * amplitude;
+      ASSERT_NEAR(cycle.second, way, 1.1 * next_term + 0.01 * kUm);
+      const bool closed_on_it = side == ServoParams::Feedback::load;
+      ASSERT_NEAR(cycle.measured, closed_on_it ? load + cycle.second : load, 1e-12);
+      const double b = 1 / params.servo.kv_per_s - latency, most = latency * amplitude * w;
+      const double ahead = most * std::sin(w * t - std::atan(w * b)) / std::hypot(1, w * b);
+      ASSERT_NEAR(load - without.truth.back(), closed_on_it ? ahead : 0, 0.03 * most);
+    }
+  }
+}
+
 TEST(LoadEncoderError, MovesTheLoadIfTheLoopIsClosedOnIt) {
   const LoadEncoderError effect{.amplitude = 1 * kUm, .period = 20e-3, .phase = 1.1};
   const double within = 5e-3 * effect.amplitude;

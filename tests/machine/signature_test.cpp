@@ -126,6 +126,7 @@ const std::map<std::string, Check>& checks() {
       // ---------------------------------------------------------------------------- servo, bus, NC
       {"command_delay", [](const Shown& s) { ellipse(s, s.fastest() * 0.2e-3, 1); }},
       {"bus_latency", [](const Shown& s) { ellipse(s, s.fastest() * 1e-3, 1); }},
+      {"load_encoder_latency", [](const Shown& s) { ellipse(s, s.fastest() * 100e-6, 1); }},
       {"kv_error", [](const Shown& s) { ellipse(s, s.fastest() / 40 * (1 / 0.9 - 1), 1); }},
       {"velocity_ff_error", [](const Shown& s) { ellipse(s, 0.01 * s.fastest() / 40, 1); }},
       {"acceleration_ff_error",

@@ -23,6 +23,7 @@ kTick = 1e-3
 kShare = np.array([0.1, 0.2, 0.3, 0.4])
 kYield = np.array([0.3, 0.7, 1.2, 2.0])
 kVelocityFilter = 0.15e-3
+kLongestLatency = 40  # loops
 
 NAMES = {
     "kv": 40.0, "ti": 0.01, "kp": 0.0, "velocity_ff": 1.0, "acceleration_ff": 1.0, "inertia_ff": 0.0,
@@ -38,6 +39,7 @@ NAMES = {
     "encoder_wave": 0.0, "encoder_amplitude": 0.0, "encoder_phase": 0.0,
     "motor_encoder_wave": 0.0, "motor_encoder_amplitude": 0.0, "motor_encoder_phase": 0.0,
     "load_encoder_wave": 0.0, "load_encoder_amplitude": 0.0, "load_encoder_phase": 0.0,
+    "load_encoder_latency": 0.0,
     "motor_feedback": 0.0, "loop_noise": 1e-9,
 }
 
@@ -139,6 +141,18 @@ def simulate(commands, drives, seed):
     def fed_back(x):
         return np.where(motor_feedback, of_motor(x), of_load(x)) if one_sided else 0.0
 
+    has_latency = bool(np.any(d.load_encoder_latency != 0))
+    past = np.repeat(commands[0][None, :, None], kLongestLatency + 2, axis=0) * np.ones((1, 1, runs))
+    steps_back = np.floor(d.load_encoder_latency * kLoop).astype(int)
+    share_back = d.load_encoder_latency * kLoop - steps_back
+
+    def lateness(step, x):
+        """What the load's encoder counts less than where the load is: its past, a straight line between loops."""
+        past[step % len(past)] = x
+        later, earlier = (np.take_along_axis(past, ((step - steps_back - i) % len(past))[None], axis=0)[0]
+                          for i in (0, 1))
+        return later + share_back * (earlier - later) - x
+
     load = np.repeat(commands[0][:, None], runs, axis=1).astype(float)
     motor = load.copy()
     v_load = np.zeros((5, runs))
@@ -164,11 +178,12 @@ def simulate(commands, drives, seed):
             c = np.repeat(coefficients[:, -1:], 4, axis=1)
         values, slopes_c, bends = c @ to_value, c @ to_slope, c @ to_bend
         noise = rng.standard_normal((kLoopsPerTick, 5, runs)) * d.loop_noise
+        late = lateness(kLoopsPerTick * k, load) if has_latency else 0.0
         here = commands[k][:, None]
         measured = reading(np.where(motor_feedback, motor, load))
-        out["measured"][k] = measured + fed_back(measured) - here
+        out["measured"][k] = measured + fed_back(measured) + np.where(d.motor_feedback > 0, 0, late) - here
         out["load"][k] = load - here
-        out["twist"][k] = load - motor + (of_load(load) - of_motor(motor) if one_sided else 0.0)
+        out["twist"][k] = load + late - motor + (of_load(load) - of_motor(motor) if one_sided else 0.0)
         out["force"][k] = force
         t = k * kTick
         for axis, run, f in d.friction_factor:
@@ -185,6 +200,8 @@ def simulate(commands, drives, seed):
             x = x + noise[j]
             turned = x + of_motor(x) if one_sided else x  # what the motor counts, for its velocity
             x = x + fed_back(x)
+            if has_latency:
+                x = x + np.where(d.motor_feedback > 0, 0, lateness(kLoopsPerTick * k + j, load))
             velocity += filter_gain * ((turned - before) * kLoop - velocity)
             before = turned
             if j % kPositionEvery == 0:

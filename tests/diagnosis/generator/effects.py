@@ -152,6 +152,11 @@ def load_encoder_error(m, axis, p):
     m.axis["load_encoder_phase"][axis] = np.deg2rad(p["phase_deg"])
 
 
+@effect(ALL, latency_us=100)
+def load_encoder_latency(m, axis, p):
+    m.axis["load_encoder_latency"][axis] = p["latency_us"] * 1e-6
+
+
 @effect(ALL, amplitude_um=lin(2), amplitude_arcsec=rot(8), phase_deg=phase,
         period_mm=lambda rng, place: 12.0 if place in LINEAR else None,
         period_deg=lambda rng, place: 18.0 if place in ROTARY else None)

@@ -119,6 +119,16 @@ class Drives(unittest.TestCase):
             self.assertAlmostEqual(more["force"], level, delta=0.01 * level)
             self.assertAlmostEqual(-more["twist"], wound, delta=0.01 * level / stiffness)
 
+    def test_a_late_encoder_of_the_load_shows_by_the_way_of_its_latency(self):
+        v, late = 0.02, 0.3e-3
+        for motor_feedback in (0.0, 1.0):
+            d = bare(2, motor_feedback=motor_feedback)
+            d.load_encoder_latency[:, 1] = late
+            s = {k: a[-500:, 0].astype(float) for k, a in drives.simulate(ramp(2000, v), d, 2).items()}
+            more = {k: (a[:, 1] - a[:, 0]).mean() for k, a in s.items()}
+            self.assertAlmostEqual(more["twist"], -v * late, delta=0.002 * v * late)
+            self.assertAlmostEqual(more["load"], 0 if motor_feedback else v * late, delta=0.01 * v * late)
+
     def test_error_of_one_measuring_system(self):
         """Both show between the systems; the load moves where its own is in error and closes the loop, by Kv/(s + Kv)."""
         v, period = 0.02, 0.02
