@@ -54,6 +54,7 @@ class Report {
     d_.differential = differential;
     d_.declared = of.declared;
     d_.found = selection_.found.machine;
+    d_.axis_names = of.record.axis_names;
     d_.warnings = of.record.warnings;
     d_.suspects = options.suspects;
     const NoiseAudit& noise = evidence.noise();

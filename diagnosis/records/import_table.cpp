@@ -70,6 +70,9 @@ class Importer {
     record_.source = table_.source;
     record_.period = base_.period;
     record_.begin = base_.begin;
+    for (const ImportMap::Axis& a : map_.axes)
+      if (const std::size_t axis = axis_named(a.place); axis < kAxisCount)
+        record_.axis_names[axis] = a.name;
     tell_units();
     tell_time();
     if (base_.samples < kFewestSamples)

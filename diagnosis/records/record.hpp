@@ -8,12 +8,14 @@
 // joint) takes the place of one of them, by its map.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "model/axes.hpp"
 #include "model/machine.hpp"
 #include "model/math.hpp"
 #include "model/piece_params.hpp"
@@ -88,6 +90,7 @@ struct Record {
   std::string machine_toml;         ///< declared machine told by the run itself; empty: none
   std::string piece_toml;           ///< piece in the machine; empty: none
   std::optional<OnTable> on_table;  ///< what was read; none: a probe on the piece
+  std::array<std::string, kAxisCount> axis_names;  ///< what the user calls them; empty: as we do
 
   std::size_t samples() const { return signals.empty() ? 0 : signals.front().value.size(); }
   /// By the clock of the table [s], to tell it. The time of a model begins with the record.

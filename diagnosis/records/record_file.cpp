@@ -67,6 +67,22 @@ std::string stretches_text(const Record& record) {
   return text;
 }
 
+std::string axis_names_text(const Record& record) {
+  std::string text;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (!record.axis_names[i].empty())
+      text += fmt::format("{} {}\n", kAxisNames[i], one_line(record.axis_names[i]));
+  return text;
+}
+
+void read_axis_names(const std::string& text, Record& record) {
+  std::istringstream lines(text);
+  std::string place, name;
+  while (lines >> place && std::getline(lines >> std::ws, name))
+    if (const std::size_t axis = axis_named(place); axis < kAxisCount)
+      record.axis_names[axis] = name;
+}
+
 bool read_signal(hid_t file, std::size_t i, MeasuredSignal& s, std::uintmax_t file_size) {
   const Handle set(H5Dopen2(file, set_name(i).c_str(), H5P_DEFAULT));
   std::string kind;
@@ -122,6 +138,7 @@ void write_record(const Record& record, const std::filesystem::path& path) {
               write(file, "machine_toml", record.machine_toml) &&
               write(file, "piece_toml", record.piece_toml) &&
               write(file, "stretches", stretches_text(record)) &&
+              write(file, "axis_names", axis_names_text(record)) &&
               write(file, "warnings", warnings) && write_on_table(file, record.on_table);
     for (std::size_t i = 0; written && i < record.signals.size(); ++i)
       written = write_signal(file, i, record.signals[i]);
@@ -141,7 +158,7 @@ Record read_record(const std::filesystem::path& path) {
     refuse(path, "the record is incomplete, damaged or was changed; import it again");
   const Quiet quiet;
   const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
-  std::string format, stretches, warnings;
+  std::string format, stretches, warnings, axis_names;
   std::int64_t version = 0, signals = 0;
   if (!file.ok() || !read(file, "format", format) || format != kRecordFormat)
     refuse(path, "is no record of vcnc import");
@@ -162,6 +179,7 @@ Record read_record(const std::filesystem::path& path) {
     sound = sound && record.signals.back().value.size() == record.samples();
   }
   record.on_table = read_on_table(file);
+  if (read(file, "axis_names", axis_names)) read_axis_names(axis_names, record);  // newer files
   const auto has = [&](SignalKind kind) {
     return std::any_of(record.signals.begin(), record.signals.end(),
                        [&](const MeasuredSignal& s) { return s.kind == kind; });

@@ -1,12 +1,14 @@
 // What came out of a diagnosis: all that diagnosis.json, the report and the new model file say.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "diagnosis/replica/replica.hpp"
 #include "diagnosis/search/candidate.hpp"
+#include "model/axes.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {
@@ -83,6 +85,8 @@ struct HeldOut {
 struct Diagnosis {
   DiagnosisVerdict verdict = DiagnosisVerdict::no_deviation;
   bool differential = false;  ///< against a healthy reference run
+  /// What the user calls the axes X, Y, Z, A, C; empty: as we do.
+  std::array<std::string, kAxisCount> axis_names;
   double explained_share = 0, model_form_share = 0;
   HeldOut chi2;
   std::vector<std::string> suspects;  ///< all that was sought; none: everything

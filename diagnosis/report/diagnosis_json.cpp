@@ -72,6 +72,14 @@ Json learned_law(const LearnedLaw& l) {
           {"not_distinguishable_from", l.not_distinguishable_from}};
 }
 
+/// What the user calls them.
+Json axes(const Diagnosis& d) {
+  Json names = Json::object();
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (!d.axis_names[i].empty()) names[std::string(kAxisNames[i])] = d.axis_names[i];
+  return names;
+}
+
 template <class T, class F>
 Json list(const std::vector<T>& all, const F& one) {
   Json result = Json::array();
@@ -86,6 +94,7 @@ std::string to_json(const Diagnosis& d, const std::string& source) {
       {"run", source},
       {"verdict", to_string(d.verdict)},
       {"mode", d.differential ? "differential" : "absolute"},
+      {"axes", axes(d)},
       {"explained_share", finite(d.explained_share)},
       {"model_form_share", finite(d.model_form_share)},
       {"suspects", d.suspects},

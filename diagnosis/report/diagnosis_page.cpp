@@ -257,6 +257,8 @@ std::string diagnosis_page(const DiagnosisStory& story) {
       d.differential ? "differential: what a healthy run has besides is taken off"
                      : "absolute: all that differs from the declared model",
       verdict_class(d.verdict), to_string(d.verdict), escaped(verdict_sentence(d)));
+  if (const std::string axes = axes_told(d); !axes.empty())
+    page += fmt::format("<p>{}.</p>\n", escaped(axes));
   if (!d.suspects.empty())
     page += fmt::format("<p>Sought was nothing but {}.</p>\n",
                         escaped(fmt::to_string(fmt::join(d.suspects, ", "))));

@@ -63,7 +63,7 @@ std::string verdict_sentence(const Diagnosis& d) {
             "what was added explains {:.1f} % of what was to be explained and leaves {:.2f} times "
             "the noise",
             d.explained_share * 100, d.left);
-      return !d.differential && !d.declared.commissioned.empty()
+      return !d.declared.commissioned.empty()
                  ? "what was added leaves no more than noise and what commissioning left"
                  : "what was added leaves nothing but noise";
     case DiagnosisVerdict::partly:
@@ -92,6 +92,14 @@ std::string verdict_sentence(const Diagnosis& d) {
   return "";
 }
 
+std::string axes_told(const Diagnosis& d) {
+  std::vector<std::string> told;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (!d.axis_names[i].empty() && d.axis_names[i] != kAxisNames[i])
+      told.push_back(fmt::format("{} is {}", kAxisNames[i], d.axis_names[i]));
+  return fmt::format("{}", fmt::join(told, ", "));
+}
+
 std::string figures_table(const std::vector<SignalFigure>& figures) {
   if (figures.empty()) return "";
   std::size_t width = 12;
@@ -113,6 +121,7 @@ std::string to_text(const Diagnosis& d) {
   std::string text = fmt::format("{}: {}\nmode: {}\n", to_string(d.verdict), verdict_sentence(d),
                                  d.differential ? "differential, against the reference run"
                                                 : "absolute, against the declared model");
+  if (const std::string axes = axes_told(d); !axes.empty()) text += "axes: " + axes + "\n";
   if (!d.suspects.empty())
     text += fmt::format("sought: nothing but {}\n", fmt::join(d.suspects, ", "));
   for (const FoundEffect& e : d.effects) {

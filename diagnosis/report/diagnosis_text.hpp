@@ -13,6 +13,9 @@ std::string to_text(const Diagnosis& diagnosis);
 /// The table of before and after alone.
 std::string figures_table(const std::vector<SignalFigure>& figures);
 
+/// "C is shoulder, X is carriage": what the user calls the axes; empty: as we do.
+std::string axes_told(const Diagnosis& diagnosis);
+
 /// What the verdict says, in one sentence.
 std::string verdict_sentence(const Diagnosis& diagnosis);
 

@@ -38,7 +38,8 @@ with the force, not with the speed)",
 
   template <class Self, class Visit>
   static void fields(Self& p, Visit& visit, bool) {
-    visit("latency_us", p.latency, unit::us, Range{-5000, 5000}, "of the load's against the motor's");
+    visit("latency_us", p.latency, unit::us, Range{-5000, 5000},
+          "of the load's against the motor's");
   }
 
   template <class T>

@@ -93,6 +93,20 @@ TEST(DiagnosisText, BeginsWithTheVerdictAndHasNumbersWithIntervals) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
 }
 
+TEST(DiagnosisText, TellsWhatTheUserCallsTheAxes) {
+  Diagnosis d = found_backlash();
+  EXPECT_EQ(to_text(d).find("axes:"), std::string::npos);
+  d.axis_names[kX] = "X";
+  d.axis_names[kC] = "shoulder";
+  EXPECT_NE(to_text(d).find("\naxes: C is shoulder\n"), std::string::npos) << to_text(d);
+  EXPECT_NE(
+      diagnosis_page({.diagnosis = d, .record = {}, .residuals = {}}).find("<p>C is shoulder.</p>"),
+      std::string::npos);
+  const auto json = nlohmann::json::parse(to_json(d, "run.csv"));
+  EXPECT_EQ(json["axes"]["C"], "shoulder");
+  EXPECT_FALSE(json["axes"].contains("Y"));
+}
+
 TEST(DiagnosisText, OfAnEffectThatIsDeclaredTheChangeIsToldToo) {
   Diagnosis d = found_backlash();
   move_number(d.declared, "effects.X.backlash.gap_um", 2);

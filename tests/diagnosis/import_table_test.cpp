@@ -207,6 +207,8 @@ TEST(ImportTable, TwoEncodersOfARobotJointBecomePositionAndTwist) {
   EXPECT_NEAR(twist->value[2000], -1e-3 * std::sin(2.0), 2e-6);
   EXPECT_EQ(record.find(SignalKind::position, kC)->source, "motor");
   EXPECT_EQ(twist->source, "load - motor");
+  EXPECT_EQ(record.axis_names[kC], "joint 2");
+  EXPECT_EQ(record.axis_names[kX], "");
 }
 
 /// Of two measuring systems the loop's is the position, as the declared machine says.
@@ -868,9 +870,11 @@ TEST_F(RecordFile, IsRefusedForAModelWhoseLoopHasTheOtherEncoder) {
   Machine machine = declared();
   machine.axes[kX].servo.feedback = ServoParams::Feedback::motor;
   record.machine_toml = to_toml(machine);
+  record.axis_names[kX] = "the long axis";
   const std::string file = folder_ / "run.h5";
   write_record(record, file);
   EXPECT_NO_THROW(load_record(file, "", folder_.write("same.toml", to_toml(machine))));
+  EXPECT_EQ(read_record(file).axis_names[kX], "the long axis");
   machine.axes[kX].servo.feedback = ServoParams::Feedback::load;
   try {
     load_record(file, "", folder_.write("other.toml", to_toml(machine)));
