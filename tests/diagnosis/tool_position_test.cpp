@@ -13,7 +13,10 @@
 #include "diagnosis/records/record_file.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
 #include "diagnosis/search/consequence.hpp"
+#include "diagnosis/search/evidence.hpp"
+#include "diagnosis/search/fitted_machine.hpp"
 #include "diagnosis/search/freed_number.hpp"
+#include "diagnosis/search/law_columns.hpp"
 #include "model/geometry/kinematics.hpp"
 #include "model/probe/noise.hpp"
 #include "tests/scratch.hpp"
@@ -108,6 +111,27 @@ std::array<std::vector<double>, 3> change(const Record& run, const std::string& 
       d[replica.channels()[c].axis].push_back(after[c][k] - before[c][k]);
   }
   return d;
+}
+
+/// A laser on X sees of Y what its mirror is tilted by, a thousandth at most: no cause is sought
+/// there.
+TEST(ToolPosition, OfOneComponentHasNoLawOfAnAxisThatItDoesNotSee) {
+  Record run = on_the_grid(3);
+  std::erase_if(run.signals, [](const MeasuredSignal& s) {
+    return s.kind == SignalKind::tool_position && s.axis != 0;
+  });
+  const Machine model = trunnion();
+  MachineReplica replica(run, model, std::nullopt);
+  Evidence evidence(run, replica, model);
+  FittedMachine at;
+  at.machine = model;
+  at.machine.effects.get<PieceTilt>().tilt.z() = 1e-3;
+  at.prediction = evidence.predict(at.machine);
+  std::set<std::size_t> displaced, pushed;
+  for (const Law& law : LawColumns(evidence, at).all())
+    (law.point == Law::Point::displacement ? displaced : pushed).insert(law.axis_index());
+  EXPECT_EQ(displaced, std::set<std::size_t>{kX});
+  EXPECT_EQ(pushed, (std::set<std::size_t>{kX, kY}));
 }
 
 TEST(ToolPosition, OfAHeldBallIsTheClosedFormOfAnAxisThatIsElsewhere) {
