@@ -530,6 +530,11 @@ double Contest::counts(const FittedMachine& m) const {
                 [&] { return less(m.residual, linear.columns, ground.step); });
 }
 
+bool Contest::counts_enough(const FittedMachine& m, std::size_t candidate) const {
+  return counts(m) >
+         needed_of({candidate}, Ground(rules_.evidence, m.residual, m.linear()).held_out_of);
+}
+
 double Contest::counts(double gain, const std::vector<double>& after,
                        const std::function<Column()>& left) const {
   std::vector<double> at_rest(after.size(), 0.0);

@@ -112,6 +112,8 @@ class Contest {
   double held_out() const { return ground_.held_out; }
   /// What counts of the gain of a machine (counted_gain.hpp).
   double counts(const FittedMachine& machine) const;
+  /// Whether that is enough for the candidate to be told that the machine has besides.
+  bool counts_enough(const FittedMachine& machine, std::size_t candidate) const;
 
  private:
   double counts(const Contender& contender) const;

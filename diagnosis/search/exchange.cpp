@@ -18,16 +18,18 @@ const FreedNumber& number_of_key(const FittedMachine& m, const std::string& key)
 
 }  // namespace
 
-void Exchange::exchange(FittedMachine& m) const {
-  std::size_t exchanges = m.found() + 1;
+bool Exchange::exchange(FittedMachine& m) const {
+  const std::size_t most = m.found() + 1;
+  std::size_t exchanges = 0;
   for (std::size_t i = 0; i < m.found();)
-    if (gives_way(m, i, exchanges > 0)) {
-      --exchanges;
+    if (gives_way(m, i, exchanges < most)) {
+      ++exchanges;
       i = 0;
     } else {
       evidence_.anchor(m.machine);
       ++i;
     }
+  return exchanges > 0;
 }
 
 bool Exchange::gives_way(FittedMachine& m, std::size_t i, bool may_give_way) const {
@@ -80,13 +82,14 @@ bool Exchange::gives_way(FittedMachine& m, std::size_t i, bool may_give_way) con
   return effect && exchange_for_as_good(m, i, less, rivals, contest, lost);
 }
 
-void Exchange::join(FittedMachine& m) const {
+bool Exchange::join(FittedMachine& m) const {
   for (std::size_t i = 0; i < m.added.size(); ++i)
     for (std::size_t j = i + 1; j < m.added.size(); ++j)
       if (rules_.candidates[m.added[i].candidate].place ==
               rules_.candidates[m.added[j].candidate].place &&
           became_one(m, i, j))
-        return;
+        return true;
+  return false;
 }
 
 bool Exchange::became_one(FittedMachine& m, std::size_t i, std::size_t j) const {

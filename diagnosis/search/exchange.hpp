@@ -28,14 +28,15 @@ class Exchange {
         base_(base),
         also_fitted_(also_fitted) {}
 
-  /// Until nothing gives way any more.
+  /// Until nothing gives way any more; what was found beside a stand-in may go with it.
   void settle(FittedMachine& m) const {
-    exchange(m);
-    join(m);
+    const bool exchanged = exchange(m), joined = join(m);
+    if (exchanged || joined) changes_.drop_uncounted(m);
   }
 
  private:
-  void exchange(FittedMachine& m) const;
+  /// Whether something gave way.
+  bool exchange(FittedMachine& m) const;
   /// Whether another one took the place of an effect or a released number, if it may; those that do
   /// as well become its class.
   bool gives_way(FittedMachine& m, std::size_t i, bool may_give_way) const;
@@ -48,7 +49,8 @@ class Exchange {
   /// `m` with one more candidate, as it was fitted in full when the last effect was accepted; null:
   /// it was not.
   const FittedMachine* fitted_before(const FittedMachine& m, std::size_t candidate) const;
-  void join(FittedMachine& m) const;
+  /// Whether two became one.
+  bool join(FittedMachine& m) const;
   /// Errors of two measuring systems that leave what the one has against the other, say. The
   /// smaller of the two must make more than a model may be wrong by.
   bool became_one(FittedMachine& m, std::size_t i, std::size_t j) const;

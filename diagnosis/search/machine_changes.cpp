@@ -89,8 +89,6 @@ FittedMachine MachineChanges::fitted_with(const FittedMachine& now, const Conten
   FittedMachine m = now;
   add(m, contender, equivalent, much);
   drop(m);
-  hold_again(m);
-  anchor_at(evidence_, m);
   return m;
 }
 
@@ -118,12 +116,31 @@ FittedMachine MachineChanges::with_dry_friction(FittedMachine m) const {
   converge(evidence_, m);
   settle_in(evidence_, m, {rules_.floor + rules_.options.least_gain});
   drop(m);
-  hold_again(m);
-  anchor_at(evidence_, m);
   return m;
 }
 
 void MachineChanges::drop(FittedMachine& m) const {
+  drop_effects(m);
+  hold_again(m);
+  anchor_at(evidence_, m);
+}
+
+void MachineChanges::drop_uncounted(FittedMachine& m) const {
+  drop(m);
+  for (std::size_t i = 0; i < m.added.size();) {
+    const FittedMachine less = taken_out(m, i, Common::held);
+    const Contest contest(rules_, less);
+    if (contest.counts_enough(m, m.added[i].candidate)) {
+      ++i;
+      continue;
+    }
+    m = removed(m, i);
+    drop(m);
+    i = 0;
+  }
+}
+
+void MachineChanges::drop_effects(FittedMachine& m) const {
   while (true) {
     std::vector<double> loss(m.added.size());
     for (std::size_t i = 0; i < m.added.size(); ++i) loss[i] = weigh(m, i);

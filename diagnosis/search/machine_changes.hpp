@@ -37,6 +37,11 @@ class MachineChanges {
   /// With dry friction in place of another law that is no more than that (is_another_law()), all
   /// fitted again.
   FittedMachine with_dry_friction(FittedMachine m) const;
+  /// Without what the others can do without; says what each one is worth. Anchored at `m` then.
+  void drop(FittedMachine& m) const;
+  /// Without effects of which beside all others nothing counts that would have them told now, and
+  /// without what the others can do without; after an exchange.
+  void drop_uncounted(FittedMachine& m) const;
   /// Without one of its effects, everything else as it was.
   FittedMachine taken_out(const FittedMachine& m, std::size_t i, Common common) const;
   /// What one added effect is worth: without it, all others moved along their columns.
@@ -63,7 +68,7 @@ class MachineChanges {
   /// Takes over where a contender was fitted to.
   void move_to(FittedMachine& m, const Refit& fit) const;
   /// Removes what the others can do without, and says what each one is worth.
-  void drop(FittedMachine& m) const;
+  void drop_effects(FittedMachine& m) const;
   FittedMachine removed(const FittedMachine& m, std::size_t i) const;
   /// Declared numbers that were released when effects were still missing get their tolerance back
   /// where that costs little.

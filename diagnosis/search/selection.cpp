@@ -121,8 +121,6 @@ class Search {
       now.rounding = rounding_of(now);
       trials_.look_again(now);
       exchange_.settle(now);
-      for (std::size_t i = 0; i < now.added.size(); ++i)
-        if (now.added[i].acts.empty()) changes_.weigh(now, i);  // one that took a place
       now.rounding = rounding_of(now);
       to.ladder.push_back(step_of(now, to.ladder.size()));
       to.machine = now;
