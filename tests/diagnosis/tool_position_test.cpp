@@ -33,10 +33,10 @@ Kinematics kinematics_of(const Machine& m) {
   return Kinematics(m.kinematics, m.probe.length, m.setup.work_offset[0]);
 }
 
-/// Axis positions for every share of a motion of kTurn that begins and ends at rest, there and back
-/// `laps` times.
+/// Axis positions for every share of a motion of `turn` [s] that begins and ends at rest, there and
+/// back `laps` times.
 template <class PositionsAt>
-Record there_and_back(int laps, const PositionsAt& at) {
+Record there_and_back(int laps, const PositionsAt& at, double turn = kTurn) {
   Record record;
   record.source = "table";
   record.period = kPeriod;
@@ -52,7 +52,7 @@ Record there_and_back(int laps, const PositionsAt& at) {
     for (const bool back : {false, true}) {
       pause(back ? 1 : 0);
       const std::size_t begin = q[0].size();
-      const int n = static_cast<int>(std::lround(kTurn / kPeriod));
+      const int n = static_cast<int>(std::lround(turn / kPeriod));
       for (int k = 0; k <= n; ++k) {
         const double u = static_cast<double>(k) / n;
         const double s = u * u * u * (10 - 15 * u + 6 * u * u);
@@ -70,12 +70,15 @@ Record there_and_back(int laps, const PositionsAt& at) {
 }
 
 /// The ball of an R-test, held on the table while A tilts to 40 deg and C turns once.
-Record ball_held(int laps) {
+Record ball_held(int laps, double turn = kTurn) {
   const Kinematics kinematics = kinematics_of(trunnion());
   const Vec3 p_WT(0.05, 0.02, 0.04);
-  Record record = there_and_back(laps, [&](double share) {
-    return kinematics.inverse(p_WT, 40 * kDegree * std::sin(kPi * share), 2 * kPi * share);
-  });
+  Record record = there_and_back(
+      laps,
+      [&](double share) {
+        return kinematics.inverse(p_WT, 40 * kDegree * std::sin(kPi * share), 2 * kPi * share);
+      },
+      turn);
   const AxisVector begin = kinematics.inverse(p_WT, 0, 0);
   record.on_table = {Vec3(begin[kX], begin[kY], begin[kZ]), 0};
   return record;
@@ -326,7 +329,7 @@ zero_mm = [1, 2, 3]
 
 /// Two laps of an R-test of a machine whose C axis is elsewhere and leans.
 TEST(ToolPositionDiagnosis, NamesWhereTheRotaryAxisIs) {
-  Record run = ball_held(2);
+  Record run = ball_held(2, 2);
   const Machine model = trunnion();
   MachineReplica replica(run, model, std::nullopt);
   Machine truth = model;
