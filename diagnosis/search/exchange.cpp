@@ -21,8 +21,10 @@ const FreedNumber& number_of_key(const FittedMachine& m, const std::string& key)
 bool Exchange::exchange(FittedMachine& m) const {
   const std::size_t most = m.found() + 1;
   std::size_t exchanges = 0;
+  std::optional<FittedMachine> within;
   for (std::size_t i = 0; i < m.found();)
-    if (gives_way(m, i, exchanges < most)) {
+    if (gives_way(m, i, exchanges < most, within)) {
+      within.reset();
       ++exchanges;
       i = 0;
     } else {
@@ -32,7 +34,8 @@ bool Exchange::exchange(FittedMachine& m) const {
   return exchanges > 0;
 }
 
-bool Exchange::gives_way(FittedMachine& m, std::size_t i, bool may_give_way) const {
+bool Exchange::gives_way(FittedMachine& m, std::size_t i, bool may_give_way,
+                         std::optional<FittedMachine>& within) const {
   AddedEffect* effect = i < m.added.size() ? &m.added[i] : nullptr;
   ReleasedNumber* number = effect ? nullptr : &m.released[i - m.added.size()];
   FittedMachine less = effect ? changes_.taken_out(m, i, MachineChanges::Common::free)
@@ -69,7 +72,7 @@ bool Exchange::gives_way(FittedMachine& m, std::size_t i, bool may_give_way) con
     const double allowed_loss = simpler(*better) ? contest.band_of(lost)
                                 : number         ? -contest.band_of(lost)
                                                  : -rules_.options.least_gain;
-    const double least = changes_.counted_within(m, contest) - allowed_loss;
+    const double least = changes_.counted_within(m, contest, within) - allowed_loss;
     FittedMachine instead = less;
     changes_.add(instead, *better, {});
     if (changes_.holds_up(instead) && changes_.is_certain(instead) &&
@@ -79,7 +82,7 @@ bool Exchange::gives_way(FittedMachine& m, std::size_t i, bool may_give_way) con
     }
     rivals.erase(better);
   }
-  return effect && exchange_for_as_good(m, i, less, rivals, contest, lost);
+  return effect && exchange_for_as_good(m, i, less, rivals, contest, lost, within);
 }
 
 bool Exchange::join(FittedMachine& m) const {
@@ -119,8 +122,8 @@ bool Exchange::became_one(FittedMachine& m, std::size_t i, std::size_t j) const 
 
 bool Exchange::exchange_for_as_good(FittedMachine& m, std::size_t i, const FittedMachine& less,
                                     const std::vector<Contender>& rivals, const Contest& contest,
-                                    double lost) const {
-  const double band = contest.band_of(lost), present = changes_.counted_within(m, contest);
+                                    double lost, std::optional<FittedMachine>& within) const {
+  const double band = contest.band_of(lost), present = changes_.counted_within(m, contest, within);
   std::optional<FittedMachine> simplest;
   double least = contest.intricacy(m.added[i]);
   std::vector<std::size_t> alike = m.added[i].class_with;

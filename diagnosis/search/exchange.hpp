@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "diagnosis/search/contest.hpp"
@@ -38,14 +39,15 @@ class Exchange {
   /// Whether something gave way.
   bool exchange(FittedMachine& m) const;
   /// Whether another one took the place of an effect or a released number, if it may; those that do
-  /// as well become its class.
-  bool gives_way(FittedMachine& m, std::size_t i, bool may_give_way) const;
+  /// as well become its class. `within`: of `m` (counted_within()).
+  bool gives_way(FittedMachine& m, std::size_t i, bool may_give_way,
+                 std::optional<FittedMachine>& within) const;
   /// Sensitivities tell a large gain to some per mille only: rivals that promise as much are fitted
   /// in full. Those that do as well are of one class with the effect; whether one of them that says
   /// it more simply has taken its place.
   bool exchange_for_as_good(FittedMachine& m, std::size_t i, const FittedMachine& less,
                             const std::vector<Contender>& rivals, const Contest& contest,
-                            double lost) const;
+                            double lost, std::optional<FittedMachine>& within) const;
   /// `m` with one more candidate, as it was fitted in full when the last effect was accepted; null:
   /// it was not.
   const FittedMachine* fitted_before(const FittedMachine& m, std::size_t candidate) const;

@@ -206,7 +206,14 @@ FittedMachine MachineChanges::within_tolerance(const FittedMachine& m, double to
 }
 
 double MachineChanges::counted_within(const FittedMachine& m, const Contest& contest) const {
-  const double counts = contest.counts(within_tolerance(m, rules_.options.out_of_tolerance));
+  std::optional<FittedMachine> within;
+  return counted_within(m, contest, within);
+}
+
+double MachineChanges::counted_within(const FittedMachine& m, const Contest& contest,
+                                      std::optional<FittedMachine>& within) const {
+  if (!within) within = within_tolerance(m, rules_.options.out_of_tolerance);
+  const double counts = contest.counts(*within);
   evidence_.anchor(m.machine);
   return counts;
 }

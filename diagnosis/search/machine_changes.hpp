@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "diagnosis/search/contest.hpp"
@@ -53,6 +54,10 @@ class MachineChanges {
   /// explains less than it seems to, and what does not is not to give way to it. Anchored at `m`
   /// then.
   double counted_within(const FittedMachine& m, const Contest& contest) const;
+  /// The same of a machine that is asked for in several contests: `within` holds it with its
+  /// numbers within their tolerances, or nothing yet.
+  double counted_within(const FittedMachine& m, const Contest& contest,
+                        std::optional<FittedMachine>& within) const;
   /// What a rival leaves that need not be fitted to the end.
   double far_more_than(const FittedMachine& m) const;
   /// Whether its effects are told by what else is known of them than what they explain together.
