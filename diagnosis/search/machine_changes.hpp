@@ -45,8 +45,6 @@ class MachineChanges {
   void drop_uncounted(FittedMachine& m) const;
   /// Without one of its effects, everything else as it was.
   FittedMachine taken_out(const FittedMachine& m, std::size_t i, Common common) const;
-  /// What one added effect is worth: without it, all others moved along their columns.
-  double weigh(FittedMachine& m, std::size_t i) const;
   /// With declared numbers that are pulled further held, of those that may be found.
   FittedMachine within_tolerance(const FittedMachine& m, double tolerances) const;
 
@@ -72,6 +70,8 @@ class MachineChanges {
  private:
   /// Takes over where a contender was fitted to.
   void move_to(FittedMachine& m, const Refit& fit) const;
+  /// What one added effect is worth: without it, all others moved along their columns.
+  double weigh(FittedMachine& m, std::size_t i) const;
   /// Removes what the others can do without, and says what each one is worth.
   void drop_effects(FittedMachine& m) const;
   FittedMachine removed(const FittedMachine& m, std::size_t i) const;

@@ -76,6 +76,10 @@ TEST(DiagnosisText, BeginsWithTheVerdictAndHasNumbersWithIntervals) {
   Diagnosis d = found_backlash();
   d.verdict = DiagnosisVerdict::explained;
   EXPECT_EQ(verdict_sentence(d), "what was added leaves nothing but noise");
+  Diagnosis commissioned = d;
+  commissioned.declared.commissioned.push_back({"position X", 1e-7});
+  EXPECT_EQ(verdict_sentence(commissioned),
+            "what was added leaves no more than noise and what commissioning left");
   d.explained_share = 0.9934;
   d.left = 1.66;
   EXPECT_EQ(verdict_sentence(d),
