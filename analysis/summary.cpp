@@ -11,11 +11,12 @@ namespace vcnc {
 namespace {
 
 /// Micrometres as they are shown with two decimals, never "-0.00".
-double um(double metres) { return std::round(metres * 1e8) / 100 + 0.0; }
+double rounded_um(double metres) { return std::round(metres * 1e8) / 100 + 0.0; }
 
 std::string error_line(const char* name, const Statistics& s) {
-  return fmt::format("  {:<9}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}\n", name, um(s.max),
-                     um(s.min), um(s.mean()), um(s.rms()), um(s.peak_to_peak()));
+  return fmt::format("  {:<9}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}\n", name, rounded_um(s.max),
+                     rounded_um(s.min), rounded_um(s.mean()), rounded_um(s.rms()),
+                     rounded_um(s.peak_to_peak()));
 }
 
 std::string errors(const Summary& s) {

@@ -312,7 +312,7 @@ value = 550
 
 // ------------------------------------------------------------------------------------- JSON
 
-std::string quoted(std::string_view text) {
+std::string json_string(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\')
@@ -353,22 +353,22 @@ std::string json(const Entry& e) {
                                    {"signature", t.signature},
                                    {"separate", t.separate},
                                    {"seen_in", seen_in(t.showing)}})
-    out += fmt::format("\"{}\":{},", key, quoted(value));
-  out += fmt::format("\"confusable\":{},", array(words(t.confusable), quoted));
+    out += fmt::format("\"{}\":{},", key, json_string(value));
+  out += fmt::format("\"confusable\":{},", array(words(t.confusable), json_string));
   out += fmt::format("\"dissipative\":{},", e.dissipative);
-  out += fmt::format("\"inject\":{},", quoted(injection(e)));
+  out += fmt::format("\"inject\":{},", json_string(injection(e)));
   std::vector<std::string> places;
   for (const Seating& seating : e.seatings)
     for (const std::string_view place : seating.places)
       places.push_back(fmt::format(
-          "{{\"place\":{},\"parameters\":{}}}", quoted(place),
+          "{{\"place\":{},\"parameters\":{}}}", json_string(place),
           array(seating.rows, [&](const Row& row) {
             return fmt::format(
                 "{{\"key\":{},\"unit\":{},\"to_si\":{},\"min\":{},\"max\":{},\"default\":{},"
                 "\"nominal\":{},\"meaning\":{}}}",
-                quoted(fmt::format("effects.{}.{}.{}", place, t.name, row.key)), quoted(row.unit),
-                number(row.to_si), number(row.range.min), number(row.range.max), row.by_default,
-                row.nominal, quoted(row.doc));
+                json_string(fmt::format("effects.{}.{}.{}", place, t.name, row.key)),
+                json_string(row.unit), number(row.to_si), number(row.range.min),
+                number(row.range.max), row.by_default, row.nominal, json_string(row.doc));
           })));
   return out + "\"places\":" + array(places, [](const std::string& p) { return p; }) + "}";
 }
@@ -480,12 +480,12 @@ std::string effect_json() {
     for (const Entry& e : entries())
       if (e.port == Port::name) order.push_back(e.text.name);
     ports += fmt::format("{}{{\"name\":{},\"order\":{}}}", ports.empty() ? "" : ",",
-                         quoted(Port::name), array(order, quoted));
+                         json_string(Port::name), array(order, json_string));
   });
-  return fmt::format("{{\"effects\":{},\n\"ports\":[{}],\n\"law_points\":{}}}\n",
-                     array(entries(), [](const Entry& e) { return fmt::format("\n{}", json(e)); }),
-                     ports,
-                     array(kLawPoints, [](const LawPointDoc& doc) { return quoted(doc.name); }));
+  return fmt::format(
+      "{{\"effects\":{},\n\"ports\":[{}],\n\"law_points\":{}}}\n",
+      array(entries(), [](const Entry& e) { return fmt::format("\n{}", json(e)); }), ports,
+      array(kLawPoints, [](const LawPointDoc& doc) { return json_string(doc.name); }));
 }
 
 std::string effect_markdown() {

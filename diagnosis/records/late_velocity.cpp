@@ -13,14 +13,6 @@ constexpr double kFast = 0.1;        // of the highest speed
 constexpr double kKnownTo = 0.2e-3;  // [s]
 constexpr double kOfRounding = 1e-6;
 
-/// By the samples before and after; missing at the ends.
-std::vector<double> slope_of(const std::vector<double>& series, double period) {
-  std::vector<double> slope(series.size(), kMissing);
-  for (std::size_t k = 1; k + 1 < series.size(); ++k)
-    slope[k] = (series[k + 1] - series[k - 1]) / (2 * period);
-  return slope;
-}
-
 }  // namespace
 
 std::optional<double> lateness_of_velocity(const Record& record, std::size_t axis) {
@@ -29,8 +21,9 @@ std::optional<double> lateness_of_velocity(const Record& record, std::size_t axi
   if (!velocity || !position) return std::nullopt;
   const auto reach = static_cast<std::size_t>(std::max(1.0, std::round(kReach / record.period)));
   const std::vector<double> told = moving_mean(velocity->value, reach),
-                            speed = moving_mean(slope_of(position->value, record.period), reach),
-                            acceleration = slope_of(speed, record.period);
+                            speed = moving_mean(first_derivative(position->value, record.period),
+                                                reach),
+                            acceleration = first_derivative(speed, record.period);
   double fastest = 0;
   for (const double v : speed)
     if (std::isfinite(v)) fastest = std::max(fastest, std::abs(v));

@@ -14,6 +14,7 @@
 #include "diagnosis/records/late_velocity.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/records/position_jumps.hpp"
+#include "diagnosis/records/series.hpp"
 #include "diagnosis/records/signal_name.hpp"
 
 namespace vcnc {
@@ -46,7 +47,7 @@ constexpr std::size_t kFewestSteps = 500;
 constexpr double kCarries = 0.5;        ///< share of a twist that comes from what the load needs
 constexpr double kCarriesPart = 0.005;  ///< ... from its inertia, and from its friction
 constexpr double kImpossible = 1e4;     ///< times a declared inertia, which no machine is off by
-constexpr double kOfRounding = 1e-9;    ///< share of a span, by which two copies may differ
+constexpr double kSameCopy = 1e-9;      ///< share of a span, by which two copies may differ
 constexpr double kMostForceLag = 0.2;   ///< [s] either way
 constexpr double kForceLag = 6e-3;      ///< [s] that lags of a current loop and filters make
 constexpr double kLateLeaves = 4;       // times less, at another time
@@ -81,13 +82,6 @@ Series smoothed(const Series& value, std::size_t half) {
     if (k >= width && std::isfinite(value[k - width])) sum -= value[k - width], --there;
     if (k + 1 >= width && there == width) result[k - half] = sum / static_cast<double>(width);
   }
-  return result;
-}
-
-Series slope_of(const Series& value, double period) {
-  Series result(value.size(), kMissing);
-  for (std::size_t k = 1; k + 1 < value.size(); ++k)
-    result[k] = (value[k + 1] - value[k - 1]) / (2 * period);
   return result;
 }
 
@@ -166,7 +160,7 @@ class Checker {
 
   /// Smoothed velocity of a position.
   Series speed_of(const MeasuredSignal& s) const {
-    return smoothed(slope_of(s.value, record_.period), half_);
+    return smoothed(first_derivative(s.value, record_.period), half_);
   }
   const MeasuredSignal* motion(std::size_t axis) const {
     const MeasuredSignal* s = record_.find(SignalKind::position, axis);
@@ -550,7 +544,7 @@ class Checker {
   ForceSeries force_series(const MeasuredSignal& force, const MeasuredSignal& position) const {
     ForceSeries s;
     s.velocity = speed_of(position);
-    s.acceleration = smoothed(slope_of(s.velocity, record_.period), half_);
+    s.acceleration = smoothed(first_derivative(s.velocity, record_.period), half_);
     s.force = smoothed(smoothed(force.value, half_), half_);
     for (const double x : s.velocity)
       if (std::isfinite(x)) s.fastest = std::max(s.fastest, std::abs(x));
@@ -704,7 +698,7 @@ bool is_copy(const std::vector<double>& value, const std::vector<double>& of) {
   if (!r.known) return false;
   Series off = value;
   for (std::size_t k = 0; k < off.size(); ++k) off[k] -= r.slope * of[k];
-  return spread_of(off).span() < kOfRounding * spread_of(value).span();
+  return spread_of(off).span() < kSameCopy * spread_of(value).span();
 }
 
 std::string usual_mistake(double factor) {

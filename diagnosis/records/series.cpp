@@ -31,6 +31,13 @@ std::vector<double> moving_mean(const std::vector<double>& series, std::size_t r
   return result;
 }
 
+std::vector<double> first_derivative(const std::vector<double>& series, double period) {
+  std::vector<double> slope(series.size(), kMissing);
+  for (std::size_t k = 1; k + 1 < series.size(); ++k)
+    slope[k] = (series[k + 1] - series[k - 1]) / (2 * period);
+  return slope;
+}
+
 std::vector<double> second_derivative(const std::vector<double>& series, double period) {
   std::vector<double> result(series.size(), kMissing);
   for (std::size_t k = 1; k + 1 < series.size(); ++k)

@@ -13,6 +13,9 @@ void hold_over_gaps(std::vector<double>& series);
 /// Means of what is known of 2 reach + 1 samples, fewer at the ends.
 std::vector<double> moving_mean(const std::vector<double>& series, std::size_t reach);
 
+/// By the samples before and after [unit/s], period [s]; missing at the ends.
+std::vector<double> first_derivative(const std::vector<double>& series, double period);
+
 /// By differences of neighbours [unit/s^2], period [s]; missing at the ends.
 std::vector<double> second_derivative(const std::vector<double>& series, double period);
 

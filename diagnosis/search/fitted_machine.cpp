@@ -14,9 +14,9 @@ namespace {
 
 /// Angles that went so far that the end of what is allowed is near, a turn back.
 void turn_back(std::vector<FreedNumber>& numbers) {
-  constexpr double kFar = 270, kTurn = 360;  // [deg]
+  constexpr double kManyTurns = 270, kTurn = 360;  // [deg]
   for (FreedNumber& n : numbers)
-    if (is_phase(n.number) && n.tolerance == 0 && std::abs(n.value) > kFar)
+    if (is_phase(n.number) && n.tolerance == 0 && std::abs(n.value) > kManyTurns)
       n.value = std::remainder(n.value, kTurn);
 }
 
@@ -84,7 +84,7 @@ std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vect
 constexpr double kDamping = 1e-3;     ///< of steps that fail undamped (refit.hpp)
 constexpr double kNoStep = 1;         ///< chi-square that no step is worth
 constexpr double kMuch = 10;          ///< and that a part of the step is worth to be sought for
-constexpr double kBetter = 0.1;       ///< of what a step promises, that it may do better by
+constexpr double kBeyondPromise = 0.1;       ///< of what a step promises, that it may do better by
 constexpr double kFarthestStep = 64;  ///< times what sensitivities tell
 
 /// Goes as far towards a refit as makes the misfit smaller: sensitivities are not everywhere what
@@ -115,7 +115,7 @@ bool step_towards(const Evidence& evidence, FittedMachine& m, const Refit& f,
     if (!(now < least)) continue;
     // What is rough about the sensitivities makes steps too short: where one does better than it
     // promised, one goes on.
-    const bool better = f.fitted - now > kNoStep + kBetter * (least - f.fitted);
+    const bool better = f.fitted - now > kNoStep + kBeyondPromise * (least - f.fitted);
     for (double more = 2; share == 1.0 && better && more <= kFarthestStep; more *= 2) {
       FittedMachine farther = at(more);
       const double then = misfit_of(farther);
@@ -236,7 +236,7 @@ constexpr double kPulledOut = 3;
 /// With declared numbers that were pulled back where they are declared, and what was added fitted
 /// to that first: from where it stands beside pulled numbers, the way may be too far.
 FittedMachine as_if_never_pulled(Evidence& evidence, FittedMachine m) {
-  constexpr int kGlance = 4;
+  constexpr int kSecondGlance = 4;
   LinearPart others;
   for (std::size_t i = 0; i < m.nuisances.numbers.size(); ++i) {
     FreedNumber& n = m.nuisances.numbers[i];
@@ -249,7 +249,7 @@ FittedMachine as_if_never_pulled(Evidence& evidence, FittedMachine m) {
   }
   m.machine = with(m.machine, m.nuisances.numbers);
   evidence.anchor(m.machine);
-  Refit alone = refit(evidence, m.machine, m.numbers(), others, {.max_iterations = kGlance});
+  Refit alone = refit(evidence, m.machine, m.numbers(), others, {.max_iterations = kSecondGlance});
   alone.linear = between(others.numbers, alone.linear, 1.0);
   alone.machine = with(alone.machine, alone.linear);
   settle_from(evidence, m, alone);

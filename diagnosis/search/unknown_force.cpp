@@ -16,7 +16,7 @@ constexpr double kReach = 5e-3;     // of the mean to either side [s]
 constexpr double kStanding = 1e-4;  // of the highest speed
 /// Of mean squares: what is missing must be of its noise, what may be left of it in the end, and
 /// what after a turn is no progress.
-constexpr double kLeastOfNoise = 10, kMostLeft = 0.5, kLeastProgress = 0.8;
+constexpr double kLeastOfNoise = 10, kMostForceLeft = 0.5, kLeastProgress = 0.8;
 
 /// Says nothing of where an axis is told to stand.
 void leave_out_standing(const std::vector<double>& command, std::vector<double>& series) {
@@ -84,7 +84,7 @@ ForceOfAxes unknown_force(const Record& healthy, const Machine& declared) {
       if (std::find(axes.begin(), axes.end(), axis) == axes.end()) force[axis] = best[axis];
   }
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    if (least[axis] > kMostLeft * at_first[axis]) best[axis].clear();
+    if (least[axis] > kMostForceLeft * at_first[axis]) best[axis].clear();
   return best;
 }
 
