@@ -81,11 +81,11 @@ std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vect
   return to;
 }
 
-constexpr double kDamping = 1e-3;     ///< of steps that fail undamped (refit.hpp)
-constexpr double kNoStep = 1;         ///< chi-square that no step is worth
-constexpr double kMuch = 10;          ///< and that a part of the step is worth to be sought for
-constexpr double kBeyondPromise = 0.1;       ///< of what a step promises, that it may do better by
-constexpr double kFarthestStep = 64;  ///< times what sensitivities tell
+constexpr double kDamping = 1e-3;       ///< of steps that fail undamped (refit.hpp)
+constexpr double kNoStep = 1;           ///< chi-square that no step is worth
+constexpr double kMuch = 10;            ///< and that a part of the step is worth to be sought for
+constexpr double kBeyondPromise = 0.1;  ///< of what a step promises, that it may do better by
+constexpr double kFarthestStep = 64;    ///< times what sensitivities tell
 
 /// Goes as far towards a refit as makes the misfit smaller: sensitivities are not everywhere what
 /// they are where they were taken. False: not a step.
