@@ -173,7 +173,6 @@ std::vector<std::size_t> Distribution::histogram(double from, double to, std::si
 }
 
 LockoutSummary summarise(const std::vector<LockoutVerdict>& verdicts) {
-  using Expect = Scenario::Expect;
   LockoutSummary s;
   std::vector<double> soft, hard, distance, share, unchecked, lock, still;
   for (const LockoutVerdict& v : verdicts) {
@@ -184,8 +183,8 @@ LockoutSummary summarise(const std::vector<LockoutVerdict>& verdicts) {
       s.as_expected += v.passed();
       continue;
     }
-    const bool faulted = !v.faults.empty() || v.expect == Expect::fault_safe;
-    const bool crash = !faulted && v.expect != Expect::none;
+    const bool faulted = !v.faults.empty() || v.expect == Scenario::Expect::fault_safe;
+    const bool crash = !faulted && v.expect != Scenario::Expect::none;
     ++(faulted ? s.faulted : crash ? s.crashes : s.ordinary);
     s.unsafe += faulted && !v.passed();
     s.borne += faulted && v.end.complete;
@@ -194,7 +193,7 @@ LockoutSummary summarise(const std::vector<LockoutVerdict>& verdicts) {
     s.soft += f.soft && !f.hard;
     s.hard += f.hard && !f.soft;
     s.both += f.soft && f.hard;
-    s.missed += crash && v.expect != Expect::refused && !v.end.refused && !f.tripped();
+    s.missed += crash && v.expect != Scenario::Expect::refused && !v.end.refused && !f.tripped();
     s.false_trips += !crash && !faulted && f.tripped();
     if (faulted || !f.tripped()) continue;  // figures are those of the healthy machine
     s.uncountable += !f.countable;

@@ -40,6 +40,12 @@ bool of_measurement(const std::string& effect) {
                   text->family == Family::setup);
 }
 
+/// Whether what it does comes and goes with time: then it tells why laps differ, or it is not it.
+bool drifts(const FoundEffect& e) {
+  const EffectText* text = effect_text(e.name);
+  return text && (text->family == Family::thermal || text->name == ProbeDrift::text.name);
+}
+
 class Report {
  public:
   Report(const DiagnosisCase& of, const Evidence& evidence, const DiagnosisOptions& options,
@@ -77,11 +83,11 @@ class Report {
     if (d_.laws.empty()) add(d_.notes, pulled_);
     tell_still_off(off);
     tell_vibrations(of_, evidence_, before_.chatter, d_);
-    tell_shifts_between_laps();
     std::stable_sort(d_.effects.begin(), d_.effects.end(), [](const auto& a, const auto& b) {
       return a.contour_error_um > b.contour_error_um;
     });
     flag_minor();
+    tell_shifts_between_laps();
     ExcitationOfRun excitation = excitation_of(of_, evidence_, selection_);
     d_.excitation = std::move(excitation.of);
     add(d_.notes, excitation.notes);
@@ -396,10 +402,13 @@ class Report {
     }
   }
 
-  /// Readings that are elsewhere in every lap: noise to a fit, but more than samples have.
+  /// Readings that are elsewhere in every lap: noise to a fit, but more than samples have. Where no
+  /// more than drifts are named but for what is minor, these were to explain it.
   void tell_shifts_between_laps() {
     if (selection_.interrupted || !options_.suspects.empty()) return;
-    const bool named = std::any_of(d_.effects.begin(), d_.effects.end(), is_of_machine);
+    const bool named = std::any_of(d_.effects.begin(), d_.effects.end(), [](const FoundEffect& e) {
+      return is_of_machine(e) && !drifts(e) && !e.minor;
+    });
     const Prediction left = evidence_.predict(d_.found);
     const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
     for (std::size_t c = 0; c < channels.size(); ++c) {

@@ -68,13 +68,15 @@ std::string verdict_sentence(const Diagnosis& d) {
                  : "what was added leaves nothing but noise";
     case DiagnosisVerdict::partly:
       return fmt::format(
-          "what was added explains {} % of what was to be explained{}",
+          "what was added explains {} % of what was to be explained{}{}",
           d.explained_share < 0.995 ? fmt::format("{:.0f}", d.explained_share * 100) : "over 99",
           d.model_form_share > 0
               ? fmt::format("; {} is an error of the model's form, so what is named goes along "
                             "with it and need not be its cause",
                             percent(d.model_form_share))
-              : "");
+              : "",
+          d.vibrations.empty() ? ""
+                               : fmt::format(", and not that {}", fmt::join(d.vibrations, ", ")));
     case DiagnosisVerdict::unexplained:
       if (!d.laws.empty()) return law_words(d.laws);
       if (!d.vibrations.empty()) return fmt::to_string(fmt::join(d.vibrations, ", "));

@@ -25,10 +25,10 @@ value: each encoder and its interface have their own)",
       .signature =
           R"(The two measuring systems are off by t_d v. With the loop closed on the motor nothing moves; with
 the loop closed on the load the axis is ahead by t_d v and its position loop has a dead time.)",
-      .confusable = "command_delay velocity_ff_error viscous sample_latency windup",
+      .confusable = "command_delay velocity_ff_error viscous sample_latency windup backlash",
       .separate =
           R"(command_delay and sample_latency are not seen between the two measuring systems; a windup twists
-with the force, not with the speed)",
+with the force, not with the speed; a backlash is as wide at every feed)",
       .showing = Showing::circle_feeds};
 
   double latency = 0;  ///< t_d [s]

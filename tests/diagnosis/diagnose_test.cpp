@@ -730,6 +730,56 @@ TEST(Diagnose, APieceThatSlipsBetweenLapsIsNotSilence) {
   }
 }
 
+/// The machine whose tool drifts as it warms up.
+class DriftingReplica : public toy::ToyReplica {
+ public:
+  explicit DriftingReplica(const Record& commands)
+      : ToyReplica(commands), period_(commands.period) {}
+  Prediction predict(const Machine& m) const override {
+    const Prediction still = ToyReplica::predict(m);
+    std::vector<std::vector<double>> all(still.begin(), still.end());
+    const ThermalDrift& drift = m.effects.axis[0].get<ThermalDrift>();
+    for (std::size_t k = 0; k < all[2].size(); ++k)
+      all[2][k] -=
+          drift.offset * std::expm1(-static_cast<double>(k) * period_ / drift.time_constant);
+    return {all.begin(), all.end()};
+  }
+
+ private:
+  double period_;
+};
+
+/// A drift that is named and leaves laps apart is not all there is.
+TEST(Diagnose, ADriftDoesNotExplainThatLapsAreElsewhere) {
+  for (const double slip_um : {0.0, 1.0}) {
+    Record record = measured({}, 49);
+    const Machine drifting = toy::machine(
+        {{"effects.X.thermal_drift.offset_um", 6}, {"effects.X.thermal_drift.time_constant_s", 3}});
+    DriftingReplica replica(record);
+    const Prediction drifts = replica.predict(drifting), still = replica.predict({});
+    const Stretch& last = record.stretches[6];
+    for (MeasuredSignal& s : record.signals)
+      if (s.kind == SignalKind::deflection)
+        for (std::size_t k = 0; k < s.value.size(); ++k)
+          s.value[k] +=
+              drifts[2][k] - still[2][k] + (k >= last.begin && k < last.end ? 1e-6 * slip_um : 0);
+    std::vector<Candidate> all = toy::candidates();
+    all.push_back({"thermal_drift",
+                   "X",
+                   {{"effects.X.thermal_drift.offset_um", 20, -1e4, 1e4},
+                    {"effects.X.thermal_drift.time_constant_s", 60, 0.1, 1e6}},
+                   {1},
+                   Family::thermal});
+    const Diagnosis d = diagnose({record, replica, {}, all});
+    ASSERT_FALSE(d.effects.empty()) << to_text(d);
+    EXPECT_EQ(d.effects[0].name, "thermal_drift");
+    EXPECT_EQ(d.verdict, slip_um > 0 ? DiagnosisVerdict::partly : DiagnosisVerdict::explained)
+        << to_text(d);
+    EXPECT_EQ(verdict_sentence(d).find("from lap to lap") != std::string::npos, slip_um > 0)
+        << verdict_sentence(d);
+  }
+}
+
 TEST(Diagnose, WhatMayBeAsDeclaredIsNotTold) {
   // Declared with a play that is there: whatever is fitted of it, it is no finding.
   const Machine as_declared = toy::machine({{"effects.X.load_play.width_um", 3}});
