@@ -20,17 +20,21 @@ VCNC = ""
 SMALL = 0.05  # circle [m]
 
 
-class Run(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="vcnc-table-")
-        self.addCleanup(folder.cleanup)
-        self.home = pathlib.Path(folder.name)
+class Runs(unittest.TestCase):
+    """Tests of one machine, whose runs are simulated together."""
 
-    def diagnosed(self):
-        command = [VCNC, "diagnose", "test.csv", "--map", "map.toml", "--model", "machine.toml", "--reference", "healthy.csv", "--out", "why"]
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="vcnc-table-")
+        cls.addClassCleanup(folder.cleanup)
+        cls.home = pathlib.Path(folder.name)
+
+    def diagnosed(self, test):
+        command = [VCNC, "diagnose", f"{test}.csv", "--map", "map.toml", "--model", "machine.toml", "--reference", "healthy.csv",
+                   "--out", f"why_{test}"]
         run = subprocess.run(command, cwd=self.home, capture_output=True, text=True, timeout=1500)
         self.assertEqual(run.returncode, 0, run.stderr)
-        return json.loads((self.home / "why" / "diagnosis.json").read_text(encoding="utf-8"))
+        return json.loads((self.home / f"why_{test}" / "diagnosis.json").read_text(encoding="utf-8"))
 
     def check_as_it_was(self, report):
         self.assertEqual((report["verdict"], report["effects"]), ("NO DEVIATION", []))
@@ -49,39 +53,47 @@ class Run(unittest.TestCase):
             self.assertGreater(told[key]["high"], value)
 
 
-class BallBar(Run):
+class BallBar(Runs):
     """Two laps each way, against the same machine's bar test with the ball set anew."""
 
+    GAP_UM = 6.0
+    OUT_OF_SQUARE = {"xy_urad": 60.0}
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        ball_bar.generate(cls.home, {"as_it_was": [], "play": [("backlash", "X", {"gap_um": cls.GAP_UM})],
+                                     "out_of_square": [("squareness", "geometry", cls.OUT_OF_SQUARE)]}, seed=4, laps=2, radius=SMALL)
+
     def test_a_machine_as_it_was(self):
-        ball_bar.generate(self.home, [], seed=3, laps=2, radius=SMALL)
-        self.check_as_it_was(self.diagnosed())
+        self.check_as_it_was(self.diagnosed("as_it_was"))
 
     def test_play_is_named_with_its_size_though_friction_turns_over_by_another_law(self):
-        gap = 6.0
-        ball_bar.generate(self.home, [("backlash", "X", {"gap_um": gap})], seed=4, laps=2, radius=SMALL)
-        report = self.diagnosed()
+        report = self.diagnosed("play")
         self.assertEqual((report["verdict"], [(e["name"], e["axis"]) for e in report["effects"]]), ("EXPLAINED", [("backlash", "X")]))
         told = report["effects"][0]["parameters"][0]
-        self.assertAlmostEqual(told["value"], gap, delta=0.05 * gap)
-        self.assertTrue(told["low"] < gap < told["high"], told)
+        self.assertAlmostEqual(told["value"], self.GAP_UM, delta=0.05 * self.GAP_UM)
+        self.assertTrue(told["low"] < self.GAP_UM < told["high"], told)
 
     def test_squareness_is_named_with_its_size(self):
-        truth = {"xy_urad": 60.0}
-        ball_bar.generate(self.home, [("squareness", "geometry", truth)], seed=3, laps=2)
-        self.check_named(self.diagnosed(), "squareness", truth)
+        self.check_named(self.diagnosed("out_of_square"), "squareness", self.OUT_OF_SQUARE)
 
 
-class RTest(Run):
+class RTest(Runs):
     """A ball held on the table while A and C turn, against the same machine's test with the sensor set anew."""
 
+    OFFSET = {"x_um": 12.0, "y_um": -8.0}
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        r_test.generate(cls.home, {"as_it_was": [], "off_centre": [("c_axis_offset", "geometry", cls.OFFSET)]}, seed=1)
+
     def test_a_machine_as_it_was(self):
-        r_test.generate(self.home, [], seed=2)
-        self.check_as_it_was(self.diagnosed())
+        self.check_as_it_was(self.diagnosed("as_it_was"))
 
     def test_where_the_axis_of_rotation_is_is_named_with_its_size(self):
-        truth = {"x_um": 12.0, "y_um": -8.0}
-        r_test.generate(self.home, [("c_axis_offset", "geometry", truth)], seed=1)
-        self.check_named(self.diagnosed(), "c_axis_offset", truth)
+        self.check_named(self.diagnosed("off_centre"), "c_axis_offset", self.OFFSET)
 
 
 if __name__ == "__main__":

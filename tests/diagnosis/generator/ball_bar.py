@@ -84,31 +84,33 @@ def map_toml(begins, radius, feed, laps):
     return "\n".join(out)
 
 
-def healthy_and_faulty(faults, rng):
-    """The same individual twice, once with faults; what is on the table is set by itself."""
+def healthy_and_faulty(tests, rng):
+    """The same individual healthy and, with the faults (name, place, parameters) of each of the tests, once more; what is on
+    the table is set by itself."""
     individual = machine.tolerated(rng)
-    machines = [machine.healthy(individual, rng), machine.healthy(individual, rng)]
-    for name, place, parameters in faults:
-        effects.inject(machines[1], name, place, parameters)
+    machines = [machine.healthy(individual, rng) for _ in range(1 + len(tests))]
+    for m, faults in zip(machines[1:], tests):
+        for name, place, parameters in faults:
+            effects.inject(m, name, place, parameters)
     for m in machines:
         m.geometry.piece, m.geometry.piece_turn = machine.PIECE, np.zeros(3)
     return machines
 
 
-def generate(out, faults, seed=1, laps=1, radius=0.1, feed=0.05):
-    """faults: (name, place, parameters) each."""
+def generate(out, tests, seed=1, laps=1, radius=0.1, feed=0.05):
+    """tests: by its name, the faults of each; NAME.csv beside healthy.csv."""
     out.mkdir(parents=True, exist_ok=True)
     toml = files.machine_toml().replace('piece = "piece.toml"\n', "")
     (out / "machine.toml").write_text(toml)
     commands, begins = course(radius, feed, laps)
     rng = np.random.default_rng(seed)
-    machines = healthy_and_faulty(faults, rng)
+    machines = healthy_and_faulty(tests.values(), rng)
     runs = simulated(commands, machines, seed)
     inside = np.zeros(len(commands), bool)
     for begin in begins:
         first, last = round(begin / drives.kTick), round((begin + TURN * laps * radius / feed) / drives.kTick)
         inside[first:last + 1] = True
-    for name, m, series in zip(("healthy", "test"), machines, runs):
+    for name, m, series in zip(("healthy", *tests), machines, runs):
         t, read = lengths(m, series, commands, radius, rng)
         rows = np.stack([t[inside], read[inside] * 1e6], axis=1)
         np.savetxt(out / f"{name}.csv", rows, fmt=("%.3f", "%.1f"), delimiter=",", header="time_s,bar_um", comments="")
@@ -143,7 +145,7 @@ def main():
     parser.add_argument("--radius", type=float, default=100, help="mm")
     parser.add_argument("--feed", type=float, default=3000, help="mm/min")
     a = parser.parse_args()
-    generate(a.out, merged(a.fault), a.seed, a.laps, a.radius * 1e-3, a.feed / 6e4)
+    generate(a.out, {"test": merged(a.fault)}, a.seed, a.laps, a.radius * 1e-3, a.feed / 6e4)
 
 
 if __name__ == "__main__":

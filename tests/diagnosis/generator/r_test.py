@@ -83,15 +83,15 @@ def map_toml(zero, laps):
     return "\n".join(out)
 
 
-def generate(out, faults, seed=1):
-    """faults: (name, place, parameters) each."""
+def generate(out, tests, seed=1):
+    """tests: by its name, the faults of each; NAME.csv beside healthy.csv."""
     out.mkdir(parents=True, exist_ok=True)
     (out / "machine.toml").write_text(files.machine_toml().replace('piece = "piece.toml"\n', ""))
     a, c, laps = rotary()
     commands = holding(a, c)
     rng = np.random.default_rng(seed)
-    machines = healthy_and_faulty(faults, rng)
-    for name, m, series in zip(("healthy", "test"), machines, simulated(commands, machines, seed)):
+    machines = healthy_and_faulty(tests.values(), rng)
+    for name, m, series in zip(("healthy", *tests), machines, simulated(commands, machines, seed)):
         t, read = readings(m, series, commands, rng)
         factors = [1 / files.DEGREE if r else 1e3 for r in files.ROTARY]
         rows = np.concatenate([t[:, None], commands * factors, read * 1e6], axis=1)
@@ -106,7 +106,7 @@ def main():
     parser.add_argument("--fault", type=fault, action="append", default=[], help="PLACE.EFFECT.PARAMETER=VALUE")
     parser.add_argument("--seed", type=int, default=1)
     a = parser.parse_args()
-    generate(a.out, merged(a.fault), a.seed)
+    generate(a.out, {"test": merged(a.fault)}, a.seed)
 
 
 if __name__ == "__main__":
