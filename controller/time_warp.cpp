@@ -39,7 +39,7 @@ void ease(WarpNode& node) {
   constexpr double kMargin = 1.0005;
   node.c_max = std::max(node.c_max, kMargin);
   const auto largest = [](const Coordinates& low, const Coordinates& high) {
-    return std::max({1.0, -kMargin * low.minCoeff(), kRoom * high.maxCoeff()});
+    return std::max({1.0, -kMargin * low.minCoeff(), kMargin * high.maxCoeff()});
   };
   const double a = largest(node.a0_low, node.a0_high);
   for (Coordinates* x : {&node.a0_low, &node.a0_high, &node.a1}) *x /= a;

@@ -14,9 +14,9 @@ namespace {
 
 /// Angles that went so far that the end of what is allowed is near, a turn back.
 void turn_back(std::vector<FreedNumber>& numbers) {
-  constexpr double kManyTurns = 270, kTurn = 360;  // [deg]
+  constexpr double kNearEnd = 270, kTurn = 360;  // [deg]
   for (FreedNumber& n : numbers)
-    if (is_phase(n.number) && n.tolerance == 0 && std::abs(n.value) > kManyTurns)
+    if (is_phase(n.number) && n.tolerance == 0 && std::abs(n.value) > kNearEnd)
       n.value = std::remainder(n.value, kTurn);
 }
 
