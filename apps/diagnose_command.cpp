@@ -16,7 +16,11 @@
 #include "apps/progress_line.hpp"
 #include "apps/stop_signal.hpp"
 #include "configs/config.hpp"
+#include "diagnosis/candidates/freed_number.hpp"
+#include "diagnosis/candidates/suspects.hpp"
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/healthy/controller_lags.hpp"
+#include "diagnosis/healthy/unknown_force.hpp"
 #include "diagnosis/quadrature.hpp"
 #include "diagnosis/records/any_record.hpp"
 #include "diagnosis/records/series.hpp"
@@ -25,10 +29,6 @@
 #include "diagnosis/report/diagnosis_json.hpp"
 #include "diagnosis/report/diagnosis_page.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
-#include "diagnosis/search/controller_lags.hpp"
-#include "diagnosis/search/freed_number.hpp"
-#include "diagnosis/search/suspects.hpp"
-#include "diagnosis/search/unknown_force.hpp"
 
 namespace vcnc {
 

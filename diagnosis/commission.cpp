@@ -13,11 +13,11 @@
 #include "diagnosis/commissioning/friction_fit.hpp"
 #include "diagnosis/commissioning/machine_in_fit.hpp"
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/fit/intervals.hpp"
+#include "diagnosis/fit/refit.hpp"
+#include "diagnosis/healthy/controller_lags.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/replica/model_comparison.hpp"
-#include "diagnosis/search/controller_lags.hpp"
-#include "diagnosis/search/intervals.hpp"
-#include "diagnosis/search/refit.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {

@@ -8,15 +8,15 @@
 #include <mutex>
 #include <optional>
 
+#include "diagnosis/beforehand/chatter_search.hpp"
+#include "diagnosis/beforehand/period_slip_search.hpp"
+#include "diagnosis/evidence/evidence.hpp"
 #include "diagnosis/findings/findings.hpp"
+#include "diagnosis/healthy/common_numbers.hpp"
 #include "diagnosis/records/signal_name.hpp"
 #include "diagnosis/replica/clipped_replica.hpp"
 #include "diagnosis/replica/model_comparison.hpp"
-#include "diagnosis/search/chatter_search.hpp"
-#include "diagnosis/search/common_numbers.hpp"
-#include "diagnosis/search/evidence.hpp"
-#include "diagnosis/search/period_slip_search.hpp"
-#include "diagnosis/search/simplest_form.hpp"
+#include "diagnosis/selection/simplest_form.hpp"
 #include "model/input_error.hpp"
 
 namespace vcnc {

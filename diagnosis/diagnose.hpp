@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/diagnosis.hpp"
 #include "diagnosis/diagnosis_case.hpp"
-#include "diagnosis/report/diagnosis.hpp"
-#include "diagnosis/search/differential.hpp"
-#include "diagnosis/search/selection.hpp"
+#include "diagnosis/healthy/differential.hpp"
+#include "diagnosis/selection/selection.hpp"
 
 namespace vcnc {
 

@@ -3,9 +3,9 @@
 
 #include <vector>
 
+#include "diagnosis/candidates/candidate.hpp"
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
-#include "diagnosis/search/candidate.hpp"
 
 namespace vcnc {
 

@@ -25,8 +25,8 @@
 // the distance cos 4phi of a third one.
 #pragma once
 
+#include "diagnosis/diagnosis.hpp"
 #include "diagnosis/records/record.hpp"
-#include "diagnosis/report/diagnosis.hpp"
 #include "model/probe/heydemann.hpp"
 
 namespace vcnc {

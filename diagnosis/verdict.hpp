@@ -9,7 +9,7 @@
 // What a law without a name does, and what vibrates by itself, nothing named explains.
 #pragma once
 
-#include "diagnosis/report/diagnosis.hpp"
+#include "diagnosis/diagnosis.hpp"
 
 namespace vcnc {
 

@@ -345,7 +345,7 @@ struct SetupParams {
 };
 
 /// How well a number of the file is known where a diagnosis is to believe something else of it than
-/// it does of its kind (diagnosis/search/freed_number.hpp).
+/// it does of its kind (diagnosis/candidates/freed_number.hpp).
 struct Uncertainty {
   std::string key;      ///< any number of the machine, effects included
   double standard = 0;  ///< standard uncertainty, in the unit of the key

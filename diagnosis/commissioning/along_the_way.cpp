@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <set>
 
-#include "diagnosis/search/refit.hpp"
-#include "diagnosis/search/screening.hpp"
-#include "diagnosis/search/trial.hpp"
-#include "diagnosis/search/trial_values.hpp"
+#include "diagnosis/candidates/trial.hpp"
+#include "diagnosis/fit/refit.hpp"
+#include "diagnosis/screening/screening.hpp"
+#include "diagnosis/screening/trial_values.hpp"
 
 namespace vcnc {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "diagnosis/search/refit.hpp"
+#include "diagnosis/fit/refit.hpp"
 
 namespace vcnc {
 namespace {

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/candidates/candidate.hpp"
 #include "diagnosis/diagnosis_case.hpp"
-#include "diagnosis/search/candidate.hpp"
-#include "diagnosis/search/controller_check.hpp"
-#include "diagnosis/search/evidence.hpp"
-#include "diagnosis/search/fitted_machine.hpp"
-#include "diagnosis/search/selection.hpp"
+#include "diagnosis/evidence/evidence.hpp"
+#include "diagnosis/fit/fitted_machine.hpp"
+#include "diagnosis/healthy/controller_check.hpp"
+#include "diagnosis/selection/selection.hpp"
 
 namespace vcnc {
 

@@ -8,9 +8,9 @@
 #include <map>
 #include <set>
 
-#include "diagnosis/search/candidate.hpp"
-#include "diagnosis/search/freed_number.hpp"
-#include "diagnosis/search/trial.hpp"
+#include "diagnosis/candidates/candidate.hpp"
+#include "diagnosis/candidates/freed_number.hpp"
+#include "diagnosis/candidates/trial.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/diagnosis.hpp"
 #include "diagnosis/diagnosis_case.hpp"
-#include "diagnosis/report/diagnosis.hpp"
-#include "diagnosis/search/evidence.hpp"
-#include "diagnosis/search/selection.hpp"
+#include "diagnosis/evidence/evidence.hpp"
+#include "diagnosis/selection/selection.hpp"
 
 namespace vcnc {
 

@@ -8,20 +8,20 @@
 #include <numeric>
 #include <utility>
 
+#include "diagnosis/candidates/candidate.hpp"
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/findings/excitation.hpp"
 #include "diagnosis/findings/record_notes.hpp"
 #include "diagnosis/findings/still_off.hpp"
 #include "diagnosis/findings/vibrations.hpp"
+#include "diagnosis/fit/intervals.hpp"
+#include "diagnosis/fit/refit.hpp"
+#include "diagnosis/healthy/common_numbers.hpp"
 #include "diagnosis/replica/model_comparison.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
-#include "diagnosis/search/candidate.hpp"
-#include "diagnosis/search/common_numbers.hpp"
-#include "diagnosis/search/consequence.hpp"
-#include "diagnosis/search/freed_number.hpp"
-#include "diagnosis/search/intervals.hpp"
-#include "diagnosis/search/law_search.hpp"
-#include "diagnosis/search/refit.hpp"
-#include "diagnosis/search/screening.hpp"
+#include "diagnosis/screening/consequence.hpp"
+#include "diagnosis/screening/screening.hpp"
+#include "diagnosis/selection/law_search.hpp"
 #include "diagnosis/verdict.hpp"
 #include "model/axes.hpp"
 

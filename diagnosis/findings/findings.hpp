@@ -31,12 +31,12 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/beforehand/chatter_search.hpp"
+#include "diagnosis/beforehand/period_slip_search.hpp"
+#include "diagnosis/diagnosis.hpp"
 #include "diagnosis/diagnosis_case.hpp"
-#include "diagnosis/report/diagnosis.hpp"
-#include "diagnosis/search/chatter_search.hpp"
-#include "diagnosis/search/evidence.hpp"
-#include "diagnosis/search/period_slip_search.hpp"
-#include "diagnosis/search/selection.hpp"
+#include "diagnosis/evidence/evidence.hpp"
+#include "diagnosis/selection/selection.hpp"
 
 namespace vcnc {
 

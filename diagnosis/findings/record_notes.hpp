@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/report/diagnosis.hpp"
-#include "diagnosis/search/chatter_search.hpp"
-#include "diagnosis/search/evidence.hpp"
+#include "diagnosis/beforehand/chatter_search.hpp"
+#include "diagnosis/diagnosis.hpp"
+#include "diagnosis/evidence/evidence.hpp"
 
 namespace vcnc {
 

@@ -3,11 +3,11 @@
 
 #include <vector>
 
-#include "diagnosis/report/diagnosis.hpp"
-#include "diagnosis/search/chatter_search.hpp"
-#include "diagnosis/search/evidence.hpp"
-#include "diagnosis/search/fitted_machine.hpp"
-#include "diagnosis/search/selection.hpp"
+#include "diagnosis/beforehand/chatter_search.hpp"
+#include "diagnosis/diagnosis.hpp"
+#include "diagnosis/evidence/evidence.hpp"
+#include "diagnosis/fit/fitted_machine.hpp"
+#include "diagnosis/selection/selection.hpp"
 
 namespace vcnc {
 

@@ -6,7 +6,7 @@
 
 #include "diagnosis/findings/excitation.hpp"
 #include "diagnosis/findings/record_notes.hpp"
-#include "diagnosis/search/consequence.hpp"
+#include "diagnosis/screening/consequence.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {

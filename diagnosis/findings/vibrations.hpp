@@ -3,10 +3,10 @@
 
 #include <vector>
 
+#include "diagnosis/beforehand/chatter_search.hpp"
+#include "diagnosis/diagnosis.hpp"
 #include "diagnosis/diagnosis_case.hpp"
-#include "diagnosis/report/diagnosis.hpp"
-#include "diagnosis/search/chatter_search.hpp"
-#include "diagnosis/search/evidence.hpp"
+#include "diagnosis/evidence/evidence.hpp"
 
 namespace vcnc {
 

@@ -24,7 +24,7 @@
 namespace vcnc {
 
 /// A force on the load of an axis of which only a healthy run of the same motion tells
-/// (search/unknown_force.hpp), and how fast the healthy machine was.
+/// (healthy/unknown_force.hpp), and how fast the healthy machine was.
 struct UnknownForce {
   std::vector<double> slow;      ///< means over 0.1 s, one per sample [N or N m]; empty: none
   std::vector<double> quick;     ///< the rest: where friction turns over, not as it is declared

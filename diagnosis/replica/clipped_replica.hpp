@@ -1,6 +1,6 @@
 // A probe that clips hides what the model gets wrong, too.
 //
-// In a difference (search/differential.hpp) what the healthy run is off its machine, e, is taken
+// In a difference (healthy/differential.hpp) what the healthy run is off its machine, e, is taken
 // off every reading. It acts before the end of the scale, L, does: of a hypothesis that reads u
 // without an end of the scale the difference is
 //

@@ -8,11 +8,11 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "diagnosis/candidates/candidate.hpp"
+#include "diagnosis/parallel.hpp"
 #include "diagnosis/records/late_velocity.hpp"
 #include "diagnosis/records/series.hpp"
 #include "diagnosis/replica/effect_stage.hpp"
-#include "diagnosis/search/candidate.hpp"
-#include "diagnosis/search/parallel.hpp"
 #include "model/parameters.hpp"
 
 namespace vcnc {

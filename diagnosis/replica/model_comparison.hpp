@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/diagnosis.hpp"
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
-#include "diagnosis/report/diagnosis.hpp"
 
 namespace vcnc {
 

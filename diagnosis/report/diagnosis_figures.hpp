@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/diagnosis.hpp"
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/model_comparison.hpp"
-#include "diagnosis/report/diagnosis.hpp"
 
 namespace vcnc {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/replica/model_comparison.hpp"
-#include "diagnosis/search/freed_number.hpp"
 
 namespace vcnc {
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "diagnosis/report/diagnosis.hpp"
+#include "diagnosis/diagnosis.hpp"
 
 namespace vcnc {
 

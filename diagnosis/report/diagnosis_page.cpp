@@ -6,10 +6,10 @@
 #include <cmath>
 
 #include "analysis/html.hpp"
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/report/diagnosis_figures.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
 #include "diagnosis/report/shown_law.hpp"
-#include "diagnosis/search/freed_number.hpp"
 
 namespace vcnc {
 

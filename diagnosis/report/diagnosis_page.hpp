@@ -5,9 +5,9 @@
 #include <string>
 #include <string_view>
 
+#include "diagnosis/diagnosis.hpp"
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/model_comparison.hpp"
-#include "diagnosis/report/diagnosis.hpp"
 
 namespace vcnc {
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/replica/model_comparison.hpp"
 #include "diagnosis/report/shown_law.hpp"
-#include "diagnosis/search/freed_number.hpp"
 #include "model/machine.hpp"
 
 namespace vcnc {

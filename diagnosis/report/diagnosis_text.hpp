@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/report/diagnosis.hpp"
+#include "diagnosis/diagnosis.hpp"
 
 namespace vcnc {
 

@@ -79,6 +79,34 @@ TEST(Layering, DependenciesPointOneWay) {
   EXPECT_GT(checked, 50u);
 }
 
+/// A folder of the diagnosis takes from those before it, and what all of them share.
+TEST(Layering, TheDiagnosisIsBuiltFromItsRecordsUp) {
+  const std::vector<std::string> order{
+      "records",   "candidates", "replica",   "evidence", "fit",           "beforehand", "healthy",
+      "screening", "laws",       "selection", "report",   "commissioning", "findings"};
+  const std::set<std::string> shared{"diagnosis.hpp", "diagnosis_options.hpp", "diagnosis_case.hpp",
+                                     "parallel.hpp", "verdict.hpp"};
+  const auto rank = [&](const std::string& folder) {
+    return std::find(order.begin(), order.end(), folder) - order.begin();
+  };
+  static const std::regex of_diagnosis(R"(diagnosis/(?:(\w+)/)?(\w+\.hpp))");
+  std::set<std::string> seen;
+  for (const Source& source : sources({"diagnosis"})) {
+    const fs::path folder = fs::path(source.path).parent_path();
+    if (folder == "diagnosis") continue;  // what is made of all of them
+    seen.insert(folder.filename());
+    for (const std::string& header : includes(source)) {
+      std::smatch parts;
+      if (!std::regex_match(header, parts, of_diagnosis)) continue;
+      if (parts[1].matched)
+        EXPECT_LE(rank(parts[1]), rank(folder.filename())) << source.path << " includes " << header;
+      else
+        EXPECT_TRUE(shared.contains(parts[2])) << source.path << " includes " << header;
+    }
+  }
+  EXPECT_EQ(seen, std::set<std::string>(order.begin(), order.end()));
+}
+
 TEST(Layering, OnlySimulatorsSeeTheGroundTruth) {
   for (const Source& source : sources()) {
     const bool may = source.folder == "servo_sim" || source.folder == "probe_sim" ||

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <string>
 
+#include "diagnosis/candidates/candidate.hpp"
 #include "diagnosis/replica/effect_stage.hpp"
-#include "diagnosis/search/candidate.hpp"
 #include "model/effects/numbers.hpp"
 
 namespace vcnc::axis_replay_test {

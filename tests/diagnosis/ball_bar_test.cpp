@@ -8,12 +8,12 @@
 
 #include "apps/experiments.hpp"
 #include "configs/config.hpp"
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/records/bar_course.hpp"
 #include "diagnosis/records/import_table.hpp"
 #include "diagnosis/records/record_file.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
-#include "diagnosis/search/freed_number.hpp"
 #include "model/probe/noise.hpp"
 #include "tests/scratch.hpp"
 

@@ -3,9 +3,9 @@
 #include <set>
 
 #include "configs/config.hpp"
+#include "diagnosis/candidates/candidate.hpp"
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/replica/effect_stage.hpp"
-#include "diagnosis/search/candidate.hpp"
-#include "diagnosis/search/freed_number.hpp"
 #include "model/drive/axis_drive.hpp"
 #include "model/parameters.hpp"
 

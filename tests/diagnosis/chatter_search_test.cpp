@@ -1,4 +1,4 @@
-#include "diagnosis/search/chatter_search.hpp"
+#include "diagnosis/beforehand/chatter_search.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/healthy/differential.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
-#include "diagnosis/search/differential.hpp"
 #include "model/math.hpp"
 #include "toy_machine.hpp"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "diagnosis/diagnose.hpp"
-#include "diagnosis/search/differential.hpp"
+#include "diagnosis/healthy/differential.hpp"
 #include "tests/diagnosis/toy_machine.hpp"
 
 namespace vcnc::clipped_replica_test {

@@ -1,4 +1,4 @@
-#include "diagnosis/search/column_products.hpp"
+#include "diagnosis/evidence/column_products.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "diagnosis/search/evidence.hpp"
+#include "diagnosis/evidence/evidence.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc {

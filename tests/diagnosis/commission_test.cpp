@@ -4,9 +4,9 @@
 
 #include <cmath>
 
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
-#include "diagnosis/search/freed_number.hpp"
 #include "healthy_run.hpp"
 #include "model/probe/noise.hpp"
 #include "tests/sanitized.hpp"

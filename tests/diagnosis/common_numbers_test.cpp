@@ -1,4 +1,4 @@
-#include "diagnosis/search/common_numbers.hpp"
+#include "diagnosis/healthy/common_numbers.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "diagnosis/diagnose.hpp"
-#include "diagnosis/search/differential.hpp"
+#include "diagnosis/healthy/differential.hpp"
 #include "tests/diagnosis/toy_machine.hpp"
 
 namespace vcnc::common_numbers_test {

@@ -1,4 +1,4 @@
-#include "diagnosis/search/comparable.hpp"
+#include "diagnosis/evidence/comparable.hpp"
 
 #include <gtest/gtest.h>
 

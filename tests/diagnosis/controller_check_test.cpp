@@ -1,12 +1,12 @@
-#include "diagnosis/search/controller_check.hpp"
+#include "diagnosis/healthy/controller_check.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/records/series.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
-#include "diagnosis/search/freed_number.hpp"
 #include "tests/diagnosis/stroke_run.hpp"
 
 namespace vcnc::controller_check_test {

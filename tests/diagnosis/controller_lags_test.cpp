@@ -1,4 +1,4 @@
-#include "diagnosis/search/controller_lags.hpp"
+#include "diagnosis/healthy/controller_lags.hpp"
 
 #include <gtest/gtest.h>
 

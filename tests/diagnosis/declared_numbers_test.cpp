@@ -7,8 +7,8 @@
 #include <string_view>
 
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/healthy/differential.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
-#include "diagnosis/search/differential.hpp"
 #include "tests/diagnosis/stroke_run.hpp"
 
 namespace vcnc::declared_numbers_test {

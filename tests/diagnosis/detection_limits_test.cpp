@@ -1,10 +1,10 @@
-#include "diagnosis/search/detection_limits.hpp"
+#include "diagnosis/screening/detection_limits.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "diagnosis/search/selection.hpp"
+#include "diagnosis/selection/selection.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc::detection_limits_test {

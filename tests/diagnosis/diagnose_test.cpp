@@ -8,12 +8,12 @@
 #include <tuple>
 
 #include "configs/config.hpp"
+#include "diagnosis/beforehand/period_slip_search.hpp"
+#include "diagnosis/candidates/suspects.hpp"
 #include "diagnosis/commission.hpp"
 #include "diagnosis/findings/findings.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
-#include "diagnosis/search/period_slip_search.hpp"
-#include "diagnosis/search/suspects.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc::diagnose_test {

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/report/diagnosis_figures.hpp"
 #include "diagnosis/report/diagnosis_json.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
 #include "diagnosis/report/shown_law.hpp"
-#include "diagnosis/search/freed_number.hpp"
 
 namespace vcnc::diagnosis_page_test {
 namespace {

@@ -1,4 +1,4 @@
-#include "diagnosis/search/differential.hpp"
+#include "diagnosis/healthy/differential.hpp"
 
 #include <gtest/gtest.h>
 

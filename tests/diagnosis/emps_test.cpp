@@ -11,10 +11,10 @@
 #include <string>
 
 #include "configs/config.hpp"
+#include "diagnosis/beforehand/chatter_search.hpp"
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/records/import_table.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
-#include "diagnosis/search/chatter_search.hpp"
 #include "model/drive/sampled_controller.hpp"
 
 namespace vcnc::emps_test {

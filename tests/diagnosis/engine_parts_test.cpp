@@ -6,15 +6,15 @@
 #include <numeric>
 #include <random>
 
-#include "diagnosis/search/contest.hpp"
-#include "diagnosis/search/intervals.hpp"
-#include "diagnosis/search/least_squares.hpp"
-#include "diagnosis/search/machine_changes.hpp"
-#include "diagnosis/search/noise_audit.hpp"
-#include "diagnosis/search/packed_column.hpp"
-#include "diagnosis/search/selection.hpp"
-#include "diagnosis/search/trial.hpp"
-#include "diagnosis/search/trial_values.hpp"
+#include "diagnosis/candidates/trial.hpp"
+#include "diagnosis/evidence/noise_audit.hpp"
+#include "diagnosis/evidence/packed_column.hpp"
+#include "diagnosis/fit/intervals.hpp"
+#include "diagnosis/fit/least_squares.hpp"
+#include "diagnosis/screening/trial_values.hpp"
+#include "diagnosis/selection/contest.hpp"
+#include "diagnosis/selection/machine_changes.hpp"
+#include "diagnosis/selection/selection.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc::engine_parts_test {

@@ -1,4 +1,4 @@
-#include "diagnosis/search/gathering.hpp"
+#include "diagnosis/evidence/gathering.hpp"
 
 #include <gtest/gtest.h>
 

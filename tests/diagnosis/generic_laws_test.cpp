@@ -1,4 +1,4 @@
-#include "diagnosis/search/generic_laws.hpp"
+#include "diagnosis/laws/generic_laws.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "diagnosis/diagnose.hpp"
-#include "diagnosis/search/law_knots.hpp"
-#include "diagnosis/search/law_search.hpp"
+#include "diagnosis/laws/law_knots.hpp"
+#include "diagnosis/selection/law_search.hpp"
 #include "tests/diagnosis/toy_machine.hpp"
 
 namespace vcnc::generic_laws_test {

@@ -6,9 +6,9 @@
 #include <sstream>
 #include <string>
 
+#include "diagnosis/candidates/candidate.hpp"
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/diagnose.hpp"
-#include "diagnosis/search/candidate.hpp"
-#include "diagnosis/search/freed_number.hpp"
 #include "recorded_run.hpp"
 
 namespace vcnc::imitation_test {

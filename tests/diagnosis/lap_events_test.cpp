@@ -1,4 +1,4 @@
-#include "diagnosis/search/lap_events.hpp"
+#include "diagnosis/evidence/lap_events.hpp"
 
 #include <gtest/gtest.h>
 

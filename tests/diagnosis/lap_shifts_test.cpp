@@ -1,11 +1,11 @@
-#include "diagnosis/search/lap_shifts.hpp"
+#include "diagnosis/evidence/lap_shifts.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 
-#include "diagnosis/search/evidence.hpp"
+#include "diagnosis/evidence/evidence.hpp"
 #include "model/probe/noise.hpp"
 #include "tests/diagnosis/toy_machine.hpp"
 

@@ -1,4 +1,4 @@
-#include "diagnosis/search/law_places.hpp"
+#include "diagnosis/laws/law_places.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <cmath>
 #include <vector>
 
+#include "diagnosis/candidates/candidate.hpp"
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
-#include "diagnosis/search/candidate.hpp"
 #include "tests/diagnosis/stroke_run.hpp"
 #include "tests/diagnosis/toy_machine.hpp"
 

@@ -1,4 +1,4 @@
-#include "diagnosis/search/line_spectrum.hpp"
+#include "diagnosis/evidence/line_spectrum.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "diagnosis/search/needed_numbers.hpp"
+#include "diagnosis/fit/needed_numbers.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,11 +2,11 @@
 // nobody is accused without one.
 #include <gtest/gtest.h>
 
+#include "diagnosis/candidates/candidate.hpp"
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
 #include "diagnosis/report/diagnosis_text.hpp"
-#include "diagnosis/search/candidate.hpp"
-#include "diagnosis/search/freed_number.hpp"
 #include "healthy_run.hpp"
 #include "tests/sanitized.hpp"
 

@@ -1,8 +1,8 @@
-#include "diagnosis/search/selection.hpp"
+#include "diagnosis/selection/selection.hpp"
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/search/common_numbers.hpp"
+#include "diagnosis/healthy/common_numbers.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc::selection_test {

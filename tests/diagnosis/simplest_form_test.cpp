@@ -1,10 +1,10 @@
-#include "diagnosis/search/simplest_form.hpp"
+#include "diagnosis/selection/simplest_form.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "diagnosis/search/selection.hpp"
+#include "diagnosis/selection/selection.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc::simplest_form_test {

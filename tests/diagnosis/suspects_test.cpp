@@ -1,9 +1,9 @@
-#include "diagnosis/search/suspects.hpp"
+#include "diagnosis/candidates/suspects.hpp"
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/search/evidence.hpp"
-#include "diagnosis/search/selection.hpp"
+#include "diagnosis/evidence/evidence.hpp"
+#include "diagnosis/selection/selection.hpp"
 #include "model/input_error.hpp"
 #include "toy_machine.hpp"
 

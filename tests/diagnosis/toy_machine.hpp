@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "diagnosis/candidates/candidate.hpp"
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/records/record.hpp"
 #include "diagnosis/replica/replica.hpp"
-#include "diagnosis/search/candidate.hpp"
-#include "diagnosis/search/freed_number.hpp"
 #include "model/math.hpp"
 #include "model/probe/noise.hpp"
 

@@ -1,4 +1,4 @@
-#include "diagnosis/search/turning_weight.hpp"
+#include "diagnosis/evidence/turning_weight.hpp"
 
 #include <gtest/gtest.h>
 

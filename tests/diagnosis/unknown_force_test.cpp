@@ -1,4 +1,4 @@
-#include "diagnosis/search/unknown_force.hpp"
+#include "diagnosis/healthy/unknown_force.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,12 +6,12 @@
 #include <cmath>
 #include <random>
 
+#include "diagnosis/candidates/candidate.hpp"
+#include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/healthy/differential.hpp"
 #include "diagnosis/records/series.hpp"
 #include "diagnosis/replica/machine_replica.hpp"
-#include "diagnosis/search/candidate.hpp"
-#include "diagnosis/search/differential.hpp"
-#include "diagnosis/search/freed_number.hpp"
 #include "tests/diagnosis/stroke_run.hpp"
 #include "tests/sanitized.hpp"
 

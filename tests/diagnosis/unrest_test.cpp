@@ -1,4 +1,4 @@
-#include "diagnosis/search/unrest.hpp"
+#include "diagnosis/beforehand/unrest.hpp"
 
 #include <gtest/gtest.h>
 
