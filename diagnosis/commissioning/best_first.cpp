@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "diagnosis/fit/ground.hpp"
 #include "diagnosis/fit/refit.hpp"
-#include "diagnosis/screening/screening.hpp"
 
 namespace vcnc {
 namespace {

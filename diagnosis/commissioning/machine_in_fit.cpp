@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/fit/ground.hpp"
 #include "diagnosis/healthy/controller_lags.hpp"
-#include "diagnosis/screening/screening.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {

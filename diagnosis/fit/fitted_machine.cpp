@@ -6,7 +6,7 @@
 #include <set>
 
 #include "diagnosis/candidates/trial.hpp"
-#include "diagnosis/screening/screening.hpp"
+#include "diagnosis/fit/ground.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {

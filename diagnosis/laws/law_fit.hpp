@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "diagnosis/evidence/evidence.hpp"
+#include "diagnosis/fit/ground.hpp"
 #include "diagnosis/laws/law_columns.hpp"
 #include "diagnosis/laws/law_knots.hpp"
-#include "diagnosis/screening/screening.hpp"
 
 namespace vcnc {
 

@@ -6,7 +6,7 @@
 
 #include "diagnosis/evidence/evidence.hpp"
 #include "diagnosis/fit/fitted_machine.hpp"
-#include "diagnosis/screening/screening.hpp"
+#include "diagnosis/fit/ground.hpp"
 #include "model/effects/law.hpp"
 
 namespace vcnc {

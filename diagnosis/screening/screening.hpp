@@ -13,6 +13,7 @@
 #include "diagnosis/evidence/evidence.hpp"
 #include "diagnosis/evidence/packed_column.hpp"
 #include "diagnosis/fit/counted_gain.hpp"
+#include "diagnosis/fit/ground.hpp"
 #include "diagnosis/fit/refit.hpp"
 #include "diagnosis/screening/consequence.hpp"
 
@@ -58,19 +59,6 @@ std::vector<TrialColumns> simulate_trials(const Evidence& evidence, const Machin
                                           const std::vector<Candidate>& candidates,
                                           std::vector<Trial> trials,
                                           const std::function<bool(double)>& keep_going);
-
-/// What the trials are held against: a residual with the numbers that go along, and the products of
-/// all of these.
-struct Ground {
-  Ground(const Evidence& evidence, const Column& residual, const LinearPart& linear);
-
-  std::vector<const Column*> columns;  ///< the residual, then those of the linear numbers
-  RoleGrams grams;
-  Eigen::VectorXd precision, offset;
-  Eigen::VectorXd step;             ///< of the linear numbers
-  double fitted = 0, held_out = 0;  ///< chi-square with priors, the linear numbers fitted
-  std::vector<double> held_out_of;  ///< of it per channel, without priors
-};
 
 /// Gains of all trials on a residual, best first.
 std::vector<Screened> screen(const Evidence& evidence, const Ground& ground, const Doubt& doubt,

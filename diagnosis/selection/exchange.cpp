@@ -5,15 +5,38 @@
 #include <string>
 #include <utility>
 
+#include "diagnosis/selection/contest.hpp"
+#include "diagnosis/selection/intricacy.hpp"
+
 namespace vcnc {
 namespace {
 
+constexpr double kMoreUsual = 0.2;  ///< numbers: a declared one by 50 tolerances
 /// Part of what two effects make together that the smaller one must make, to be one of two.
 constexpr double kOneOfTwo = 0.01;
 
 const FreedNumber& number_of_key(const FittedMachine& m, const std::string& key) {
   return *std::find_if(m.nuisances.numbers.begin(), m.nuisances.numbers.end(),
                        [&](const FreedNumber& n) { return n.number.key == key; });
+}
+
+/// Whether a declared number does as well as an effect that gains `gain`, and says less.
+bool says_it_simpler(const Appraisal& appraisal, const Contender& rival, const AddedEffect& effect,
+                     double gain) {
+  const std::vector<Candidate>& candidates = appraisal.rules().candidates;
+  if (rival.released.empty() || rival.gain < gain - appraisal.band_of(gain)) return false;
+  return intricacy(candidates, rival) + (gain - rival.gain) / appraisal.band_of(gain) <
+         intricacy(candidates, effect);
+}
+
+/// Whether an effect of a usual size does as well as a declared number, which gains `gain`, and
+/// that is as far off as hardly any is.
+bool is_more_usual(const Appraisal& appraisal, const Contender& rival, const FreedNumber& number,
+                   double gain) {
+  const double band = appraisal.band_of(gain), less = gain - rival.gain;
+  return rival.released.empty() && less < band &&
+         intricacy(appraisal.rules().candidates, rival) + std::max(0.0, less) / band <
+             intricacy(number) - kMoreUsual;
 }
 
 }  // namespace
@@ -40,28 +63,31 @@ bool Exchange::gives_way(FittedMachine& m, std::size_t i, bool may_give_way,
   ReleasedNumber* number = effect ? nullptr : &m.released[i - m.added.size()];
   FittedMachine less = effect ? changes_.taken_out(m, i, MachineChanges::Common::free)
                               : m.holding(number->key, base_);
-  Contest contest(rules_, less);
-  const double lost = contest.held_out() - m.held_out;
-  if (effect) effect->needless = contest.needless_among(effect->numbers, m.columns_of(i), lost);
+  const Contest contest(rules_, less);
+  const Appraisal& appraisal = contest.appraisal();
+  const double lost = appraisal.held_out() - m.held_out;
+  if (effect) effect->needless = appraisal.needless_among(effect->numbers, m.columns_of(i), lost);
   std::vector<Contender> rivals =
       contest.rivals(kNearLoss * lost, effect ? effect->candidate : rules_.candidates.size());
   if (number) std::erase_if(rivals, [&](const Contender& r) { return r.released == number->key; });
   std::vector<std::size_t>& alike = effect ? effect->class_with : number->class_with;
   alike.clear();
   for (const Contender& r : rivals)
-    if (r.released.empty() && r.gain > std::max(lost - contest.band_of(lost), 0.5 * lost))
+    if (r.released.empty() && r.gain > std::max(lost - appraisal.band_of(lost), 0.5 * lost))
       alike.push_back(r.candidate);
   if (!may_give_way) return false;
   const double worth =
-      contest.counts(m) - 4 * static_cast<double>(effect ? effect->numbers.size() : 1);
+      appraisal.counts(m) - 4 * static_cast<double>(effect ? effect->numbers.size() : 1);
   const auto simpler = [&](const Contender& r) {
-    return effect ? contest.says_it_simpler(r, *effect, lost)
-                  : contest.is_more_usual(r, number_of_key(m, number->key), lost);
+    return effect ? says_it_simpler(appraisal, r, *effect, lost)
+                  : is_more_usual(appraisal, r, number_of_key(m, number->key), lost);
   };
   // What is missing still, one that has more numbers may imitate a little of.
   const double imitated = kHalf * rules_.excess(m.held_out);
   const auto clearly = [&](const Contender& r) {
-    return effect && contest.intricacy(r) > contest.intricacy(*effect) ? imitated : 0;
+    return effect && intricacy(rules_.candidates, r) > intricacy(rules_.candidates, *effect)
+               ? imitated
+               : 0;
   };
   const auto better = std::find_if(rivals.begin(), rivals.end(), [&](const Contender& r) {
     return simpler(r) || r.worth() >= worth + clearly(r);
@@ -69,20 +95,20 @@ bool Exchange::gives_way(FittedMachine& m, std::size_t i, bool may_give_way,
   if (better != rivals.end()) {
     // What takes the place of a declared number says more, and must do clearly better: else
     // the number took its place again.
-    const double allowed_loss = simpler(*better) ? contest.band_of(lost)
-                                : number         ? -contest.band_of(lost)
+    const double allowed_loss = simpler(*better) ? appraisal.band_of(lost)
+                                : number         ? -appraisal.band_of(lost)
                                                  : -rules_.options.least_gain;
-    const double least = changes_.counted_within(m, contest, within) - allowed_loss;
+    const double least = changes_.counted_within(m, appraisal, within) - allowed_loss;
     FittedMachine instead = less;
     changes_.add(instead, *better, {});
     if (changes_.holds_up(instead) && changes_.is_certain(instead) &&
-        changes_.counted_within(instead, contest) >= least) {
+        changes_.counted_within(instead, appraisal) >= least) {
       m = std::move(instead);
       return true;
     }
     rivals.erase(better);
   }
-  return effect && exchange_for_as_good(m, i, less, rivals, contest, lost, within);
+  return effect && exchange_for_as_good(m, i, less, rivals, appraisal, lost, within);
 }
 
 bool Exchange::join(FittedMachine& m) const {
@@ -99,7 +125,7 @@ bool Exchange::became_one(FittedMachine& m, std::size_t i, std::size_t j) const 
   const FittedMachine less = changes_.taken_out(
       changes_.taken_out(m, j, MachineChanges::Common::free), i, MachineChanges::Common::free);
   const Contest contest(rules_, less);
-  const double lost = contest.held_out() - m.held_out,
+  const double lost = contest.appraisal().held_out() - m.held_out,
                wrong = std::max(rules_.options.class_gain, rules_.options.share_of_found * lost);
   if (std::min(m.added[i].gain, m.added[j].gain) < std::max(kOneOfTwo * lost, 2 * wrong))
     return false;
@@ -121,11 +147,13 @@ bool Exchange::became_one(FittedMachine& m, std::size_t i, std::size_t j) const 
 }
 
 bool Exchange::exchange_for_as_good(FittedMachine& m, std::size_t i, const FittedMachine& less,
-                                    const std::vector<Contender>& rivals, const Contest& contest,
-                                    double lost, std::optional<FittedMachine>& within) const {
-  const double band = contest.band_of(lost), present = changes_.counted_within(m, contest, within);
+                                    const std::vector<Contender>& rivals,
+                                    const Appraisal& appraisal, double lost,
+                                    std::optional<FittedMachine>& within) const {
+  const double band = appraisal.band_of(lost),
+               present = changes_.counted_within(m, appraisal, within);
   std::optional<FittedMachine> simplest;
-  double least = contest.intricacy(m.added[i]);
+  double least = intricacy(rules_.candidates, m.added[i]);
   std::vector<std::size_t> alike = m.added[i].class_with;
   for (const Contender& r : rivals) {
     if (!r.released.empty() || r.gain < kAsGood * lost ||
@@ -136,15 +164,15 @@ bool Exchange::exchange_for_as_good(FittedMachine& m, std::size_t i, const Fitte
       instead = *known;
     else
       changes_.add(instead, r, {}, changes_.far_more_than(m));
-    const double less_counts = present - changes_.counted_within(instead, contest);
+    const double less_counts = present - changes_.counted_within(instead, appraisal);
     if (less_counts > band || instead.added.empty() || !changes_.holds_up(instead)) continue;
     alike.push_back(r.candidate);
     AddedEffect& last = instead.added.back();
     last.needless =
-        contest.needless_among(last.numbers, instead.columns_of(instead.added.size() - 1), lost);
-    const double intricacy = contest.intricacy(last) + less_counts / band;
-    if (intricacy > least - kClearlySimpler) continue;
-    least = intricacy;
+        appraisal.needless_among(last.numbers, instead.columns_of(instead.added.size() - 1), lost);
+    const double says = intricacy(rules_.candidates, last) + less_counts / band;
+    if (says > least - kClearlySimpler) continue;
+    least = says;
     simplest = std::move(instead);
   }
   m.added[i].class_with = alike;

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "diagnosis/fit/fitted_machine.hpp"
-#include "diagnosis/selection/contest.hpp"
+#include "diagnosis/selection/appraisal.hpp"
 #include "diagnosis/selection/machine_changes.hpp"
 
 namespace vcnc {
@@ -46,7 +46,7 @@ class Exchange {
   /// in full. Those that do as well are of one class with the effect; whether one of them that says
   /// it more simply has taken its place.
   bool exchange_for_as_good(FittedMachine& m, std::size_t i, const FittedMachine& less,
-                            const std::vector<Contender>& rivals, const Contest& contest,
+                            const std::vector<Contender>& rivals, const Appraisal& appraisal,
                             double lost, std::optional<FittedMachine>& within) const;
   /// `m` with one more candidate, as it was fitted in full when the last effect was accepted; null:
   /// it was not.

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "diagnosis/screening/detection_limits.hpp"
-#include "diagnosis/selection/contest.hpp"
+#include "diagnosis/selection/contest_rules.hpp"
 
 namespace vcnc {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "diagnosis/fit/intervals.hpp"
-#include "diagnosis/screening/screening.hpp"
+#include "diagnosis/selection/released_numbers.hpp"
 #include "model/axes.hpp"
 
 namespace vcnc {
@@ -129,8 +129,7 @@ void MachineChanges::drop_uncounted(FittedMachine& m) const {
   drop(m);
   for (std::size_t i = 0; i < m.added.size();) {
     const FittedMachine less = taken_out(m, i, Common::held);
-    const Contest contest(rules_, less);
-    if (contest.counts_enough(m, m.added[i].candidate)) {
+    if (Appraisal(rules_, less).counts_enough(m, m.added[i].candidate)) {
       ++i;
       continue;
     }
@@ -205,15 +204,15 @@ FittedMachine MachineChanges::within_tolerance(const FittedMachine& m, double to
   });
 }
 
-double MachineChanges::counted_within(const FittedMachine& m, const Contest& contest) const {
+double MachineChanges::counted_within(const FittedMachine& m, const Appraisal& appraisal) const {
   std::optional<FittedMachine> within;
-  return counted_within(m, contest, within);
+  return counted_within(m, appraisal, within);
 }
 
-double MachineChanges::counted_within(const FittedMachine& m, const Contest& contest,
+double MachineChanges::counted_within(const FittedMachine& m, const Appraisal& appraisal,
                                       std::optional<FittedMachine>& within) const {
   if (!within) within = within_tolerance(m, rules_.options.out_of_tolerance);
-  const double counts = contest.counts(*within);
+  const double counts = appraisal.counts(*within);
   evidence_.anchor(m.machine);
   return counts;
 }

@@ -10,7 +10,7 @@
 #include "diagnosis/evidence/evidence.hpp"
 #include "diagnosis/fit/fitted_machine.hpp"
 #include "diagnosis/healthy/controller_check.hpp"
-#include "diagnosis/selection/contest.hpp"
+#include "diagnosis/selection/appraisal.hpp"
 
 namespace vcnc {
 
@@ -51,10 +51,10 @@ class MachineChanges {
   /// What counts with all declared numbers within their tolerances: what pulls them further
   /// explains less than it seems to, and what does not is not to give way to it. Anchored at `m`
   /// then.
-  double counted_within(const FittedMachine& m, const Contest& contest) const;
-  /// The same of a machine that is asked for in several contests: `within` holds it with its
+  double counted_within(const FittedMachine& m, const Appraisal& appraisal) const;
+  /// The same of a machine that is asked for by several: `within` holds it with its
   /// numbers within their tolerances, or nothing yet.
-  double counted_within(const FittedMachine& m, const Contest& contest,
+  double counted_within(const FittedMachine& m, const Appraisal& appraisal,
                         std::optional<FittedMachine>& within) const;
   /// What a rival leaves that need not be fitted to the end.
   double far_more_than(const FittedMachine& m) const;

@@ -10,6 +10,7 @@
 #include "diagnosis/screening/detection_limits.hpp"
 #include "diagnosis/selection/contest.hpp"
 #include "diagnosis/selection/exchange.hpp"
+#include "diagnosis/selection/intricacy.hpp"
 #include "diagnosis/selection/machine_changes.hpp"
 #include "diagnosis/selection/trial_pool.hpp"
 
@@ -136,16 +137,16 @@ class Search {
         break;
       if (!accept_one(now, from, next, contest)) break;
     }
-    hold_unlikely(now, first);
+    hold_unlikely(now, first.appraisal());
     to.machine = std::move(now);
   }
 
   /// Declared numbers that are pulled to where they hardly are, for next to nothing, stay as
   /// declared: what an effect of the same drive lacks or has too much of, they would make up for.
-  void hold_unlikely(FittedMachine& m, const Contest& contest) {
+  void hold_unlikely(FittedMachine& m, const Appraisal& first) {
     FittedMachine held = changes_.within_tolerance(m, kUnlikely);
-    const double nothing = contest.band_of(contest.held_out());  // as if nothing were left
-    if (held.found() > 0 && contest.counts(held) >= contest.counts(m) - nothing &&
+    const double nothing = first.band_of(first.held_out());  // as if nothing were left
+    if (held.found() > 0 && first.counts(held) >= first.counts(m) - nothing &&
         changes_.holds_up(held))
       m = std::move(held);
     for (FreedNumber& n : m.nuisances.numbers) n.held = false;
@@ -199,7 +200,7 @@ class Search {
       if (changes_.is_another_law(trial)) trial = changes_.with_dry_friction(std::move(trial));
       if (from.held_out - trial.held_out > contenders[i].needed && !says_the_same(trial, now) &&
           changes_.holds_up(trial)) {
-        now = best_of_as_good(from, std::move(trial), contenders, i, contest);
+        now = best_of_as_good(from, std::move(trial), contenders, i, contest.appraisal());
         return true;
       }
       evidence_.anchor(from.machine);
@@ -226,25 +227,25 @@ class Search {
   /// better when all is fitted, or if it is a declared number that does as well and says less.
   FittedMachine best_of_as_good(const FittedMachine& now, FittedMachine trial,
                                 const std::vector<Contender>& contenders, std::size_t than,
-                                const Contest& contest) {
+                                const Appraisal& appraisal) {
     const Contender* chosen = &contenders[than];
     const bool leaves = rules_.excess(trial.held_out) > options_.least_gain;
     also_fitted_ = {trial};
-    double present = changes_.counted_within(trial, contest);
+    double present = changes_.counted_within(trial, appraisal);
     for (const Contender* other : as_good(contenders, than, leaves)) {
       FittedMachine instead = also_fitted_.emplace_back(
           changes_.fitted_with(now, *other, {}, changes_.far_more_than(trial)));
       const double more = std::max(1.0, 1.0 + static_cast<double>(other->numbers.size()) -
                                             static_cast<double>(chosen->numbers.size()));
-      const double counts = changes_.counted_within(instead, contest),
-                   band = contest.band_of(other->gain);
+      const double counts = changes_.counted_within(instead, appraisal),
+                   band = appraisal.band_of(other->gain);
       // Of one kind, it must explain half of what the present one leaves.
       const bool far_better =
           other->released.empty() != chosen->released.empty() ||
           trial.held_out - instead.held_out >= kHalf * rules_.excess(trial.held_out);
       const bool simpler = !other->released.empty() && counts > present - band &&
-                           contest.intricacy(*other) + (present - counts) / band <
-                               contest.intricacy(*chosen) - kClearlySimpler;
+                           intricacy(candidates_, *other) + (present - counts) / band <
+                               intricacy(candidates_, *chosen) - kClearlySimpler;
       if (!simpler && !(far_better && counts >= present + more * options_.class_gain)) continue;
       if (!changes_.holds_up(instead) || !changes_.is_certain(instead)) continue;
       present = counts;

@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "diagnosis/candidates/trial.hpp"
+#include "diagnosis/fit/ground.hpp"
 #include "diagnosis/fit/intervals.hpp"
 #include "diagnosis/fit/needed_numbers.hpp"
 #include "diagnosis/screening/consequence.hpp"
-#include "diagnosis/screening/screening.hpp"
 
 namespace vcnc {
 namespace {

@@ -7,7 +7,7 @@
 #include "diagnosis/fit/fitted_machine.hpp"
 #include "diagnosis/screening/detection_limits.hpp"
 #include "diagnosis/screening/trial_values.hpp"
-#include "diagnosis/selection/contest.hpp"
+#include "diagnosis/selection/contest_rules.hpp"
 
 namespace vcnc {
 
