@@ -6,9 +6,9 @@
 #include <set>
 
 #include "diagnosis/candidates/candidate.hpp"
+#include "diagnosis/candidates/effect_stage.hpp"
 #include "diagnosis/candidates/freed_number.hpp"
 #include "diagnosis/candidates/trial.hpp"
-#include "diagnosis/replica/effect_stage.hpp"
 #include "model/effects/numbers.hpp"
 #include "model/parameters.hpp"
 

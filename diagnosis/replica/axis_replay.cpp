@@ -6,9 +6,9 @@
 #include <thread>
 #include <utility>
 
+#include "diagnosis/candidates/effect_stage.hpp"
 #include "diagnosis/parallel.hpp"
 #include "diagnosis/records/record.hpp"
-#include "diagnosis/replica/effect_stage.hpp"
 #include "model/drive/axis_drive.hpp"
 #include "model/fingerprint.hpp"
 #include "model/probe/probe_sensor.hpp"

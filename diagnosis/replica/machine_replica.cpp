@@ -9,10 +9,10 @@
 #include <stdexcept>
 
 #include "diagnosis/candidates/candidate.hpp"
+#include "diagnosis/candidates/effect_stage.hpp"
 #include "diagnosis/parallel.hpp"
 #include "diagnosis/records/late_velocity.hpp"
 #include "diagnosis/records/series.hpp"
-#include "diagnosis/replica/effect_stage.hpp"
 #include "model/parameters.hpp"
 
 namespace vcnc {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <optional>
 
-#include "diagnosis/replica/effect_stage.hpp"
+#include "diagnosis/candidates/effect_stage.hpp"
 #include "model/fingerprint.hpp"
 #include "model/probe/heydemann.hpp"
 #include "model/probe/probe_sensor.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "diagnosis/candidates/candidate.hpp"
-#include "diagnosis/replica/effect_stage.hpp"
+#include "diagnosis/candidates/effect_stage.hpp"
 #include "model/effects/numbers.hpp"
 
 namespace vcnc::axis_replay_test {

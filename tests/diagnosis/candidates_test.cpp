@@ -4,8 +4,8 @@
 
 #include "configs/config.hpp"
 #include "diagnosis/candidates/candidate.hpp"
+#include "diagnosis/candidates/effect_stage.hpp"
 #include "diagnosis/candidates/freed_number.hpp"
-#include "diagnosis/replica/effect_stage.hpp"
 #include "model/drive/axis_drive.hpp"
 #include "model/parameters.hpp"
 

@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "diagnosis/replica/effect_stage.hpp"
+#include "diagnosis/candidates/effect_stage.hpp"
 #include "model/effects/numbers.hpp"
 #include "tests/diagnosis/recorded_run.hpp"
 
