@@ -7,7 +7,7 @@
 namespace vcnc {
 
 WholeFile::WholeFile(std::filesystem::path path)
-    : path_(std::move(path)), temporary_(path_.string() + ".partial") {
+    : path_(std::move(path)), temporary_(path_.string() + kTemporary) {
   stream_.open(temporary_, std::ios::binary | std::ios::trunc);
   if (!stream_)
     throw std::runtime_error(path_.string() + ": cannot be written: " + std::strerror(errno));

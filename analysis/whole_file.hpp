@@ -10,6 +10,8 @@ namespace vcnc {
 /// Writes to a temporary name beside `path` and renames in commit(); gone if not committed.
 class WholeFile {
  public:
+  static constexpr const char* kTemporary = ".partial";  ///< behind the name, until commit()
+
   explicit WholeFile(std::filesystem::path path);
   ~WholeFile();
   WholeFile(const WholeFile&) = delete;

@@ -437,8 +437,9 @@ int command_line(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? kExitOk : kExitBadInput;
+    code = app.exit(e) == 0 ? kExitOk : kExitBadInput;
   }
+  if (!std::cout.flush()) throw std::runtime_error("standard output: cannot be written");
   return code;
 }
 

@@ -46,6 +46,7 @@ int commission_command(const CommissionOptions& options) {
   for (const FittedNumber& n : c.numbers)
     std::cout << fmt::format("  {} = {}\n", n.key, with_interval(n));
   std::cout << figures_table(c.figures);
+  for (const std::string& warning : record.warnings) std::cerr << "vcnc: " << warning << '\n';
   for (const std::string& warning : of_times) std::cerr << "vcnc: " << warning << '\n';
   for (const std::string& warning : c.warnings) std::cerr << "vcnc: " << warning << '\n';
   if (stop_requested()) {

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "apps/node_options.hpp"
+#include "apps/output_file.hpp"
 #include "apps/path_writer.hpp"
 #include "apps/program_options.hpp"
 #include "configs/config.hpp"
@@ -37,6 +38,7 @@ int interpret_command(const InterpretOptions& options) {
       options.machine.empty() ? bare_machine() : load_machine(options.machine, options.assignments),
       options.program_path);
   InterpreterOptions wanted = interpreter_options(options);
+  if (!options.json.empty()) refuse_foreign_output("--json", options.json, "{\"program\": \"");
   using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
   File file(options.json.empty() ? nullptr : std::fopen(options.json.c_str(), "wb"), &std::fclose);
   if (!options.json.empty() && !file) throw InputError(options.json + ": cannot be written");

@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
-#include <fstream>
 #include <iostream>
 #include <iterator>
+#include <optional>
+#include <string_view>
 
 #include "apps/operations.hpp"
+#include "apps/output_file.hpp"
 #include "bus/tick.hpp"
 #include "configs/config.hpp"
 #include "controller/limit_use.hpp"
@@ -16,18 +17,20 @@
 namespace vcnc {
 namespace {
 
-/// Every cycle as one line of a CSV file.
+constexpr std::string_view kHeader =
+    "time_s,X_mm,Y_mm,Z_mm,A_deg,C_deg,tip_X_mm,tip_Y_mm,tip_Z_mm,feed_mm_min,line\n";
+
+/// Every cycle as one line of a CSV file; without a path, none.
 class PlanCsv {
  public:
-  explicit PlanCsv(const std::string& path) : path_(path) {
-    if (path_.empty()) return;
-    file_.open(path_, std::ios::binary);
-    if (!file_) fail();
-    file_ << "time_s,X_mm,Y_mm,Z_mm,A_deg,C_deg,tip_X_mm,tip_Y_mm,tip_Z_mm,feed_mm_min,line\n";
+  explicit PlanCsv(const std::string& path) {
+    if (path.empty()) return;
+    file_.emplace("--csv", path, kHeader);
+    file_->stream() << kHeader;
   }
 
   void add(Tick cycle, const PlayerStep& step) {
-    if (path_.empty()) return;
+    if (!file_) return;
     text_.clear();
     const auto out = std::back_inserter(text_);
     fmt::format_to(out, "{:.3f}", seconds(cycle));
@@ -35,20 +38,16 @@ class PlanCsv {
       fmt::format_to(out, ",{:.7f}", step.position[i] / (is_rotary(i) ? kDegree : 1e-3));
     for (const double x : step.tip) fmt::format_to(out, ",{:.7f}", x * 1e3);
     fmt::format_to(out, ",{:.4f},{}\n", step.feed * 60e3, step.line);
-    file_ << text_;
+    file_->stream() << text_;
   }
 
   void close() {
-    if (path_.empty()) return;
-    file_.close();
-    if (!file_) fail();
+    if (file_) file_->commit();
   }
 
  private:
-  [[noreturn]] void fail() const { throw InputError(path_ + ": cannot be written"); }
-
-  std::string path_, text_;
-  std::ofstream file_;
+  std::optional<OutputFile> file_;
+  std::string text_;
 };
 
 /// What the operator does in this cycle.

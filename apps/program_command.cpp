@@ -2,11 +2,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
-#include <fstream>
 #include <iostream>
 #include <memory>
 
+#include "apps/output_file.hpp"
 #include "configs/config.hpp"
 #include "controller/diagnosis_program.hpp"
 #include "controller/player.hpp"
@@ -16,6 +15,9 @@
 namespace vcnc {
 
 namespace {
+
+/// In the head of every program of ours.
+constexpr const char* kMark = "\n(Machine: ";
 
 struct Arguments : ProgramOptions {
   std::string machine, out, axis = "X", direction = "ccw";
@@ -52,18 +54,14 @@ void write_program(const std::string& kind, Arguments a) {
   } catch (const std::invalid_argument& e) {
     throw InputError(std::string("vcnc program ") + kind + ": " + e.what());
   }
-  const std::string partial = a.out + ".partial";
-  std::ofstream out(partial, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) throw InputError(a.out + ": cannot be written");
+  OutputFile out("--out", a.out, kMark);
+  out.stream() << text;
   try {
-    Player(partial, machine);
+    if (const auto file = out.so_far()) Player(*file, machine);
   } catch (const ProgramError& e) {
-    std::remove(partial.c_str());
     throw InputError(std::string("this machine cannot run the program: ") + e.what());
   }
-  std::rename(partial.c_str(), a.out.c_str());
+  out.commit();
   std::cout << a.out << ": " << std::count(text.begin(), text.end(), '\n') << " lines\n";
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "model/math.hpp"
 
@@ -29,6 +30,26 @@ double periods_per_turn(const Candidate& c, const Trial& trial) {
   for (std::size_t i = 0; i < c.numbers.size(); ++i)
     if (has_part(c.numbers[i].key, ".lobes")) return trial.values[i];
   return 1;
+}
+
+/// The amplitude that a wave of the base machine has most of, as one of the directions.
+const Direction* amplitude_of_present(const Candidate& c, const Trial& trial) {
+  const Direction* most = nullptr;
+  for (const Direction& d : trial.directions)
+    if (!is_shape(c, d.number) && !has_no_phase(c.numbers[d.number]) &&
+        (!most || std::abs(trial.values[d.number]) > std::abs(trial.values[most->number])))
+      most = &d;
+  return most && trial.values[most->number] != 0 ? most : nullptr;
+}
+
+/// A wave that the base machine has already is turned by as much as the step of its amplitude
+/// displaces: A sin(k x + psi + d) = A sin(k x + psi) + A d cos(k x + psi).
+std::optional<Direction> turn_of_present(const Candidate& c, const Trial& trial,
+                                         std::size_t phase) {
+  const Direction* amplitude = amplitude_of_present(c, trial);
+  if (!amplitude) return std::nullopt;
+  const double angle = amplitude->step / trial.values[amplitude->number];
+  return Direction{phase, false, angle / kDegree / periods_per_turn(c, trial)};
 }
 
 }  // namespace
@@ -89,6 +110,9 @@ std::vector<Trial> trials(const Machine& base, const std::vector<Candidate>& can
       if (phase < candidate.numbers.size() && !present && !has_no_phase(n))
         first.directions.push_back({i, true, step});
     }
+    if (phase < candidate.numbers.size() && present)
+      if (const auto turn = turn_of_present(candidate, first, phase))
+        first.directions.push_back(*turn);
     std::vector<Trial> grid{first};
     for (Direction& direction : first.directions)
       if (const FreeNumber& n = candidate.numbers[direction.number]; is_limit(n) && !present) {
@@ -160,10 +184,17 @@ std::vector<FreedNumber> start_of(const Candidate& candidate, const Trial& trial
     }
     values[phase] = angle / kDegree / periods_per_turn(candidate, trial);
   }
+  const bool turned = phase < values.size() && in[phase] != 0;
+  if (const Direction* a = turned ? amplitude_of_present(candidate, trial) : nullptr) {
+    const double was = values[a->number], along = was + in[a->number],
+                 beside = was * in[phase] * kDegree * periods_per_turn(candidate, trial);
+    values[phase] += std::atan2(beside, along) / kDegree / periods_per_turn(candidate, trial);
+    in[a->number] = std::hypot(along, beside) - was;
+  }
   std::vector<FreedNumber> numbers;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const FreeNumber& n = candidate.numbers[i];
-    if (is_fixed(n) || (is_phase(n) && !two)) continue;
+    if (is_fixed(n) || (is_phase(n) && !two && !turned)) continue;
     const bool shape = is_shape(candidate, i);
     if (!shape)
       values[i] += has_no_phase(n) ? in[i] : in[i] * std::cos(angle) + across[i] * std::sin(angle);

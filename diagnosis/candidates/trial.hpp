@@ -5,7 +5,8 @@
 //
 //   A sin(k x + psi) = A cos(psi) sin(k x) + A sin(psi) cos(k x)
 //
-// so that the phase needs no search. Shapes that cannot be linearised away are tried at several
+// so that the phase needs no search; of one that the base machine has, the second is a turn of its
+// phase. Shapes that cannot be linearised away are tried at several
 // values: wavelengths and frequencies where the residual has lines (trial_values), time constants
 // at shares of the run's length, places across the travel. An amplitude of which nothing would be
 // most, not least (the end of a scale: 0 is none), is tried at several values as well.

@@ -510,19 +510,32 @@ double Evidence::rms(const Prediction& prediction, std::size_t channel, Role rol
   return rms_of(off, channel, role);
 }
 
-std::vector<double> Evidence::rms_within_laps(const Prediction& prediction, Role role) const {
+SeriesOfChannels Evidence::off_in_blocks(const Prediction& prediction, bool once) const {
   SeriesOfChannels off = measured_;
   for (std::size_t c = 0; c < off.size(); ++c)
     for (std::size_t k = 0; k < off[c].size(); ++k) off[c][k] -= prediction[c][k];
   mask(off);
-  if (!per_shift_.empty() && partition_.repeated)
+  if (!once && !per_shift_.empty() && partition_.repeated)
     take_out_shifts(partition_.stretches, per_shift_, off, Shifts::constant);
   for (const RecordBlock& block : partition_.blocks)
-    for (std::size_t c = 0; block.once && c < off.size(); ++c)
+    for (std::size_t c = 0; block.once != once && c < off.size(); ++c)
       std::fill(off[c].begin() + static_cast<std::ptrdiff_t>(block.begin),
                 off[c].begin() + static_cast<std::ptrdiff_t>(block.end), kMissing);
+  return off;
+}
+
+std::vector<double> Evidence::rms_within_laps(const Prediction& prediction, Role role) const {
+  const SeriesOfChannels off = off_in_blocks(prediction, false);
   std::vector<double> all;
   for (std::size_t c = 0; c < off.size(); ++c) all.push_back(rms_of(off[c], c, role, weight_[c]));
+  return all;
+}
+
+std::vector<double> Evidence::rms_run_once(const Prediction& prediction) const {
+  const SeriesOfChannels off = off_in_blocks(prediction, true);
+  std::vector<double> all;
+  for (std::size_t c = 0; c < off.size(); ++c)
+    all.push_back(rms_of(off[c], c, Role::both, weight_[c]));
   return all;
 }
 

@@ -138,6 +138,9 @@ class Evidence {
   /// Of every channel, as samples weigh, less what shifts of the piece, other ones in every lap,
   /// make of the readings; where motions were repeated, of those alone.
   std::vector<double> rms_within_laps(const Prediction& prediction, Role role) const;
+  /// The same of what was run once beside motions that were repeated, shifts included; nought where
+  /// nothing was.
+  std::vector<double> rms_run_once(const Prediction& prediction) const;
 
   /// Products of all pairs of the columns, per block.
   BlockGrams grams(const std::vector<const Column*>& columns) const;
@@ -158,6 +161,8 @@ class Evidence {
   /// Sample by sample, whatever laps are shifted by.
   Column::Channels whitened(const SeriesOfChannels& change) const;
   /// Of what can be compared of a channel.
+  /// What is measured less a prediction, in the blocks of motions that were run once, or in others.
+  SeriesOfChannels off_in_blocks(const Prediction& prediction, bool once) const;
   double rms_of(const std::vector<double>& series, std::size_t channel, Role role,
                 const std::vector<float>& weight = {}) const;
   /// Of the variance of a channel's noise: what the steps of the signal as recorded make, 0 .. 1.

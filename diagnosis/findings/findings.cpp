@@ -10,6 +10,7 @@
 
 #include "diagnosis/candidates/candidate.hpp"
 #include "diagnosis/candidates/freed_number.hpp"
+#include "diagnosis/candidates/suspects.hpp"
 #include "diagnosis/findings/excitation.hpp"
 #include "diagnosis/findings/record_notes.hpp"
 #include "diagnosis/findings/still_off.hpp"
@@ -82,6 +83,7 @@ class Report {
     // Without a law, numbers were pulled for want of it.
     if (d_.laws.empty()) add(d_.notes, pulled_);
     tell_still_off(off);
+    add(d_.notes, notes_of_once(evidence_, d_.found));
     tell_vibrations(of_, evidence_, before_.chatter, d_);
     std::stable_sort(d_.effects.begin(), d_.effects.end(), [](const auto& a, const auto& b) {
       return a.contour_error_um > b.contour_error_um;
@@ -267,6 +269,7 @@ class Report {
 
   /// A declared number that no builder could be so wrong about.
   void tell_unlikely(const FreedNumber& n) {
+    if (never_quite_absent(n.number.key)) return;  // nobody declares what is left of an error
     const double times = n.centre == 0 ? 1 : n.value / n.centre;
     if (times > 0 && times < kUnlikelyTimes && 1 / times < kUnlikelyTimes) return;
     d_.warnings.push_back(fmt::format(
@@ -503,6 +506,13 @@ class Report {
     made_worse_ = !signals_made_worse(at_rest).empty();
   }
 
+  /// With suspects, nothing but these.
+  bool is_sought(const Excitation& e) const {
+    return is_suspected(options_.suspects, e.key) ||
+           std::any_of(options_.suspects.begin(), options_.suspects.end(),
+                       [&](const std::string& s) { return (e.name + ".").starts_with(s + "."); });
+  }
+
   void tell_ladder() {
     std::vector<double> rms;
     for (std::size_t c = 0; c < evidence_.replica().channels().size(); ++c)
@@ -536,7 +546,7 @@ class Report {
         .interrupted = selection_.interrupted,
         .held_out_samples = evidence_.count(Role::held_out),
         .excited = std::any_of(d_.excitation.begin(), d_.excitation.end(),
-                               [](const Excitation& e) { return e.excited; }),
+                               [&](const Excitation& e) { return e.excited && is_sought(e); }),
         .named = named,
         .law = !d_.laws.empty(),
         .vibrates = !d_.vibrations.empty(),

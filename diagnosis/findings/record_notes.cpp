@@ -15,6 +15,8 @@ namespace {
 
 /// Part of the readings that may count less without a word.
 constexpr double kSomeTurn = 0.005;
+/// Times its noise that a signal is off in what was run once for a word.
+constexpr double kOffOnce = 10;
 
 /// Whether a line is that of an axis that vibrates by itself.
 bool is_of(const std::vector<Chatter>& chatter, const NoiseLine& line) {
@@ -92,6 +94,23 @@ std::vector<std::string> notes_of_turning(const Evidence& evidence) {
           "to another; no signal of a drive tells when it should.",
           channel_name(evidence.replica().channels()[c]), percent(share)));
   return notes;
+}
+
+std::vector<std::string> notes_of_once(const Evidence& evidence, const Machine& machine) {
+  std::string off;
+  const std::vector<double> once = evidence.rms_run_once(evidence.predict(machine));
+  for (std::size_t c = 0; c < once.size(); ++c) {
+    const double noise = std::max(evidence.reckoned_with(c), 0.5 * evidence.step_of(c));
+    if (once[c] < kOffOnce * noise) continue;
+    const ComparedChannel& channel = evidence.replica().channels()[c];
+    const ShownUnit unit = shown_unit(channel);
+    off += fmt::format("{}{} by {:.3g} {} rms ({:.0f} times its noise)", off.empty() ? "" : ", ",
+                       channel_name(channel), once[c] * unit.factor, unit.name, once[c] / noise);
+  }
+  if (off.empty()) return {};
+  return {"In what was run once is still off " + off +
+          ": without repetition that counts as noise, and the verdict is of the repeated motions "
+          "alone. Run every motion twice to have it explained."};
 }
 
 }  // namespace vcnc

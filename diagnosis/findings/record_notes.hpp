@@ -25,4 +25,8 @@ std::vector<std::string> notes_of_events(const Evidence& evidence);
 /// Readings that count less than the figures tell, which are of all alike.
 std::vector<std::string> notes_of_turning(const Evidence& evidence);
 
+/// Signals that a machine leaves off in what was run once beside repeated motions: there that
+/// counts as noise, and a verdict says nothing of it.
+std::vector<std::string> notes_of_once(const Evidence& evidence, const Machine& machine);
+
 }  // namespace vcnc

@@ -1,6 +1,7 @@
 #include "diagnosis/fit/least_squares.hpp"
 
 #include <ceres/ceres.h>
+#include <glog/logging.h>
 
 #include <algorithm>
 #include <cmath>
@@ -104,6 +105,7 @@ class InVain : public ceres::IterationCallback {
 }  // namespace
 
 LeastSquaresSolution solve(const LeastSquaresProblem& problem) {
+  FLAGS_minloglevel = google::GLOG_FATAL;  // a search that fails is not the user's concern
   LeastSquaresSolution solution;
   solution.x = problem.start.cwiseMax(problem.min).cwiseMin(problem.max);
   if (solution.x.size() == 0) {

@@ -31,6 +31,8 @@ constexpr std::size_t kSlack = 3;
 constexpr double kUntold = 20, kFarOff = 5;
 /// Each lap is held against one of the healthy run where that leaves less than this of the scatter.
 constexpr double kClearlyLess = 0.5;
+/// Part of the time of its motions that a run must have in common with the healthy one.
+constexpr double kLeastInCommon = 0.25;
 constexpr double kApart_s = 0.1;  ///< between two parts of a record
 /// Part of the readings that may be left out without a word.
 constexpr double kLeftOut = 0.2;
@@ -187,6 +189,16 @@ std::vector<const Stretch*> partners(const Record& now, const Stretch& lap, cons
   std::vector<const Stretch*> laps = all(true, At::the_same_place);
   if (laps.empty() && !knows_forces(healthy)) laps = all(false, At::the_same_place);
   return laps.empty() ? all(true, At::any_place) : laps;
+}
+
+/// Part of the time of a run's motions that the healthy run does, too.
+double share_with_partners(const Record& now, const Record& healthy) {
+  std::size_t all = 0, with = 0;
+  for (const Stretch& lap : now.stretches) {
+    all += lap.end - lap.begin;
+    if (!partners(now, lap, healthy).empty()) with += lap.end - lap.begin;
+  }
+  return all > 0 ? static_cast<double>(with) / static_cast<double>(all) : 0;
 }
 
 /// The sample of a healthy lap that is the sample k of another.
@@ -375,10 +387,10 @@ void check_comparable(const Record& now, const Record& healthy) {
                              "compared with a healthy run; give them in the map ([[laps]] or "
                              "lap_column)");
   check_same_kinematics(now, healthy);
-  if (std::all_of(now.stretches.begin(), now.stretches.end(),
-                  [&](const Stretch& lap) { return partners(now, lap, healthy).empty(); }))
-    throw MeasurementError(healthy.source + ": does none of the motions of " + now.source +
-                           "; a healthy run needs the same program");
+  if (const double share = share_with_partners(now, healthy); share < kLeastInCommon)
+    throw MeasurementError(fmt::format(
+        "{}: does {} of the motions of {}; a healthy run needs the same program", healthy.source,
+        share == 0 ? "none" : fmt::format("only {:.2g} % (by time)", 100 * share), now.source));
   if (std::none_of(now.signals.begin(), now.signals.end(), [&](const MeasuredSignal& s) {
         return is_compared(s.kind) && healthy.find(s.kind, s.axis);
       }))
@@ -393,12 +405,17 @@ DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
   Pairings pairings;
   for (const Stretch& lap : now.stretches)
     pairings.push_back({&lap, partners(now, lap, healthy.record)});
-  const std::size_t unmatched = static_cast<std::size_t>(
-      std::erase_if(pairings, [](const Pairing& p) { return p.healthy.empty(); }));
+  std::erase_if(pairings, [](const Pairing& p) { return p.healthy.empty(); });
   DifferentialRecord result{.record = now, .noise = healthy.noise, .healthy = healthy.machine};
+  // What repeats a motion without a partner repeats nothing that is compared.
+  result.record.stretches.clear();
+  for (const Pairing& p : pairings) result.record.stretches.push_back(*p.lap);
+  std::vector<std::string> alone;
   for (MeasuredSignal& signal : result.record.signals) {
     if (!is_compared(signal.kind)) continue;
     if (signal.kind == SignalKind::position && is_followed(now, signal.axis)) continue;
+    if (!healthy.record.find(signal.kind, signal.axis))
+      alone.push_back(signal_name(signal.kind, signal.axis));
     Difference difference = difference_of(now, signal, healthy, pairings);
     if (is_reading(signal.kind)) {
       std::vector<double> off(signal.value.size());
@@ -409,10 +426,14 @@ DifferentialRecord less_healthy(const Record& now, const HealthyRun& healthy) {
     result.noise_scale.emplace_back(ComparedChannel{signal.kind, signal.axis},
                                     difference.noise_scale);
   }
-  if (unmatched > 0)
+  if (!alone.empty())
     result.record.warnings.push_back(
-        "Some motions have no partner in the reference run and are left out: was it the same "
-        "program?");
+        fmt::format("The reference run has no {}: not compared.", fmt::join(alone, ", ")));
+  if (pairings.size() < now.stretches.size())
+    result.record.warnings.push_back(fmt::format(
+        "{:.0f} % of the motions (by time) have no partner in the reference run and are left out: "
+        "was it the same program?",
+        std::max(1.0, 100 * (1 - share_with_partners(now, healthy.record)))));
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     result.unknown[axis] = in_laps_of(now, healthy, healthy.unknown[axis]);
   result.off = leave_out_untold(result.record, now);

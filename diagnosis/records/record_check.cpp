@@ -223,6 +223,12 @@ class Checker {
     }
   }
 
+  /// What a drive that moves cannot have: its column holds something else, or is dead.
+  bool is_left_out(const MeasuredSignal& s) const {
+    return (s.kind == SignalKind::force || s.kind == SignalKind::velocity) && constant(s.value) &&
+           !stands(s.axis);
+  }
+
   void check_values() {
     std::size_t compared = 0, still = 0;
     for (MeasuredSignal& s : record_.signals) {
@@ -233,7 +239,8 @@ class Checker {
       const bool at_rest = s.kind != SignalKind::temperature && s.kind != SignalKind::clock &&
                            !is_reading(s.kind) && !raw && stands(s.axis);
       if (is_constant && s.kind != SignalKind::temperature && !told && !at_rest)
-        warn(fmt::format("{} is constant; nothing can be learnt from it", name(s)));
+        warn(fmt::format("{} is constant; nothing can be learnt from it{}", name(s),
+                         is_left_out(s) ? ", and it is left out" : ""));
       if (told && !record_.find(SignalKind::command, s.axis) && !is_followed(record_, s.axis))
         warn(fmt::format("{} is not used: no command of {} is known", name(s), kAxisNames[s.axis]));
       if (is_constant) continue;
@@ -257,6 +264,9 @@ class Checker {
           "deflection, or sine and cosine is needed");
     if (compared == still)
       refuse("all measured signals are constant; nothing can be learnt from the run");
+    for (std::size_t i = record_.signals.size(); i-- > 0;)
+      if (is_left_out(record_.signals[i]))
+        record_.signals.erase(record_.signals.begin() + static_cast<std::ptrdiff_t>(i));
     const double seconds = static_cast<double>(record_.samples()) * record_.period;
     if (seconds < 1)
       warn(

@@ -1,6 +1,7 @@
 #include "diagnosis/records/record_file.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <optional>
@@ -116,21 +117,16 @@ bool read_stretches(const std::string& text, Record& record) {
   return true;
 }
 
-}  // namespace
-
-void write_record(const Record& record, const std::filesystem::path& path) {
+/// The whole file in memory: HDF5 does not survive a disk that is full when it closes a file.
+std::string image_of(const Record& record, const std::filesystem::path& path) {
+  constexpr std::size_t kGrowth = 1 << 20;
   const Quiet quiet;
-  const std::filesystem::path part = partial(path);
-  bool written = false;
-  {
-    Handle file(H5Fcreate(part.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
-    if (!file.ok())
-      refuse(path, path.has_parent_path() && !std::filesystem::is_directory(path.parent_path())
-                       ? "there is no folder " + path.parent_path().string()
-                       : "the record cannot be created");
-    std::string warnings;
-    for (const std::string& w : record.warnings) warnings += one_line(w) + "\n";
-    written = write(file, "format", std::string(kRecordFormat)) &&
+  const Handle in_memory(H5Pcreate(H5P_FILE_ACCESS));
+  H5Pset_fapl_core(in_memory, kGrowth, /*backing_store=*/false);
+  const Handle file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, in_memory));
+  std::string warnings;
+  for (const std::string& w : record.warnings) warnings += one_line(w) + "\n";
+  bool made = file.ok() && write(file, "format", std::string(kRecordFormat)) &&
               write(file, "format_version", kRecordVersion) &&
               write(file, "signals", static_cast<std::int64_t>(record.signals.size())) &&
               write(file, "source", record.source) && write(file, "period_s", record.period) &&
@@ -140,17 +136,38 @@ void write_record(const Record& record, const std::filesystem::path& path) {
               write(file, "stretches", stretches_text(record)) &&
               write(file, "axis_names", axis_names_text(record)) &&
               write(file, "warnings", warnings) && write_on_table(file, record.on_table);
-    for (std::size_t i = 0; written && i < record.signals.size(); ++i)
-      written = write_signal(file, i, record.signals[i]);
-    written = H5Fclose(file.release()) >= 0 && written;
-  }
-  written = written && put_seal(part);
+  for (std::size_t i = 0; made && i < record.signals.size(); ++i)
+    made = write_signal(file, i, record.signals[i]);
+  made = made && H5Fflush(file, H5F_SCOPE_GLOBAL) >= 0;
+  const ssize_t size = made ? H5Fget_file_image(file, nullptr, 0) : -1;
+  std::string image(static_cast<std::size_t>(std::max<ssize_t>(size, 0)), '\0');
+  if (size <= 0 || H5Fget_file_image(file, image.data(), image.size()) != size)
+    refuse(path, "the record cannot be written");
+  return image;
+}
+
+}  // namespace
+
+void write_record(const Record& record, const std::filesystem::path& path) {
+  const std::string image = image_of(record, path);
+  const std::filesystem::path part = partial(path);
+  std::ofstream out(part, std::ios::binary | std::ios::trunc);
+  if (!out)
+    refuse(path, path.has_parent_path() && !std::filesystem::is_directory(path.parent_path())
+                     ? "there is no folder " + path.parent_path().string()
+                     : "the record cannot be created");
+  errno = 0;
+  out.write(image.data(), static_cast<std::streamsize>(image.size()));
+  out.close();
+  const bool written = !out.fail() && put_seal(part);
+  const int why = errno;
   std::error_code error;
   if (written) std::filesystem::rename(part, path, error);
   if (written && !error) return;
   std::error_code ignored;
   std::filesystem::remove(part, ignored);
-  refuse(path, "the record cannot be written");
+  refuse(path, std::string("the record cannot be written") +
+                   (why != 0 ? std::string(": ") + std::strerror(why) : ""));
 }
 
 Record read_record(const std::filesystem::path& path) {

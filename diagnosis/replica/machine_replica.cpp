@@ -206,7 +206,7 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
       measured_[c] = at_cycles(signal->value, period_, motion_.known.size());
   if (piece) piece_ = make_piece(*piece);
   against_.piece = piece_.get();
-  if (record.on_table) hold_against(*record.on_table);
+  if (record.on_table) hold_against(*record.on_table, record);
   for (auto& memory : axis_memory_) memory = std::make_unique<Memory<AxisReplay>>(kAxisReplays);
   for (auto& memory : watched_) memory = std::make_unique<Memory<WatchedReplay>>(kWatched);
   pose_memory_ = std::make_unique<Memory<Poses>>(kPoses);
@@ -217,7 +217,7 @@ MachineReplica::MachineReplica(const Record& record, const Machine& declared,
 MachineReplica::~MachineReplica() = default;
 
 /// Where the tool is when the linear axes bring it there, the rotary ones as they begin.
-void MachineReplica::hold_against(const OnTable& it) {
+void MachineReplica::hold_against(const OnTable& it, const Record& record) {
   AxisVector stands;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     stands[axis] = declared_.axes[axis].limits.start;
@@ -233,7 +233,7 @@ void MachineReplica::hold_against(const OnTable& it) {
                               declared_.setup.work_offset[0]);
   const Eigen::Matrix3d R_WS = kinematics.jacobian(q).leftCols<3>();  // X, Y, Z in the table
   against_.on_table = {kinematics.forward(q).p_WT, it.bar_length, R_WS.transpose()};
-  if (it.is_bar() && still.size() == 1)
+  if (still.size() == 1 && (it.is_bar() || !record.find(SignalKind::tool_position, still.front())))
     across_ = R_WS.col(static_cast<Eigen::Index>(still.front())).normalized();
 }
 
@@ -303,7 +303,9 @@ MachineReplica::Hypothesis MachineReplica::hypothesis_of(const Machine& machine,
   if (!across_.isZero()) {
     Vec3& shift = h.machine.effects.get<PieceOffset>().shift;
     shift -= across_ * across_.dot(shift);
-    h.machine.effects.get<PieceTilt>() = {};
+    Vec3& tilt = h.machine.effects.get<PieceTilt>().tilt;
+    tilt =
+        against_.on_table->bar_length > 0 ? Vec3(Vec3::Zero()) : Vec3(across_ * across_.dot(tilt));
   }
   h.actual = vcnc::actual(h.machine);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)

@@ -29,8 +29,9 @@
 // moved along with the axes to first order. So it is exact at the anchor, and the nearer the
 // better. What cannot be had quickly is computed in full.
 //
-// A bar that stays in a plane is held to be set up in it: what shifts or tilts it out of that, it
-// shows by its square alone, and a fit by sensitivities would go astray.
+// A bar that stays in a plane is held to be set up in it, and so is a sensor that does not tell
+// what is across (a grid): what shifts or tilts them out of that, they show by its square alone,
+// and a fit by sensitivities would go astray.
 //
 // Errors of the signals repeat with every few micrometres of deflection, and where the ball is, the
 // model may not know to one. They are therefore taken where the record says it was: moved by what
@@ -95,7 +96,7 @@ class MachineReplica : public Replica {
   AxisReplay replayed(const Hypothesis& hypothesis, std::size_t axis) const;
   void sample_as_recorded(AxisReplay& replay, std::size_t axis) const;
   Prediction predict(const Hypothesis& hypothesis, const AxisReplays& axes) const;
-  void hold_against(const OnTable& it);
+  void hold_against(const OnTable& it, const Record& record);
   void forget_loops_of_followed(Machine& machine) const;
   bool knows_forces() const;  ///< of some axis, by apply()
   Prediction assembled(const AxisReplays& axes, const Deflections& reading) const;
@@ -115,7 +116,7 @@ class MachineReplica : public Replica {
   Deflections measured_;  ///< at 1 ms; empty where not recorded
   std::unique_ptr<Piece> piece_;
   Counterpart against_;
-  Vec3 across_ = Vec3::Zero();  ///< unit normal of the plane that a bar stays in; zero: none
+  Vec3 across_ = Vec3::Zero();  ///< unit normal of the plane that is not left; zero: none
   PerAxis<std::unique_ptr<Memory<AxisReplay>>> axis_memory_;
   PerAxis<std::unique_ptr<Memory<WatchedReplay>>> watched_;
   std::unique_ptr<Memory<Poses>> pose_memory_;  ///< on the anchor's axes

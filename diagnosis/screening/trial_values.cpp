@@ -61,12 +61,14 @@ struct Line {
   Eigen::Index channel;
 };
 
-/// Peaks of the powers of each channel, the strongest first.
+/// Peaks of the powers of each channel, the strongest first; the longest wave is one if it does
+/// more than the next.
 std::vector<Line> lines_of(const Eigen::ArrayXXd& power, const WaveGrid& grid, double least) {
   std::vector<Line> lines;
   for (Eigen::Index c = 0; c < power.cols(); ++c)
-    for (Eigen::Index i = 1; i + 1 < power.rows(); ++i)
-      if (power(i, c) >= power(i - 1, c) && power(i, c) > power(i + 1, c) && power(i, c) >= least)
+    for (Eigen::Index i = 0; i + 1 < power.rows(); ++i)
+      if ((i == 0 || power(i, c) >= power(i - 1, c)) && power(i, c) > power(i + 1, c) &&
+          power(i, c) >= least)
         lines.push_back({grid.waves(i), power(i, c), c});
   std::sort(lines.begin(), lines.end(),
             [](const Line& x, const Line& y) { return x.power > y.power; });

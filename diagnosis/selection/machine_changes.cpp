@@ -199,9 +199,7 @@ FittedMachine MachineChanges::removed(const FittedMachine& m, std::size_t i) con
 }
 
 FittedMachine MachineChanges::within_tolerance(const FittedMachine& m, double tolerances) const {
-  return vcnc::within_tolerance(evidence_, m, tolerances, [&](const FreedNumber& n) {
-    return may_be_released(rules_.options, n);
-  });
+  return vcnc::within_tolerance(evidence_, m, tolerances, may_be_out);
 }
 
 double MachineChanges::counted_within(const FittedMachine& m, const Appraisal& appraisal) const {

@@ -31,9 +31,12 @@ void refit_far(const Appraisal& appraisal, double least, std::vector<Contender>&
 
 }  // namespace
 
+bool may_be_out(const FreedNumber& n) {
+  return !n.common() && n.tolerance > 0 && !is_clamping(n.number.key);
+}
+
 bool may_be_released(const DiagnosisOptions& options, const FreedNumber& n) {
-  return !n.common() && n.tolerance > 0 && !is_clamping(n.number.key) &&
-         is_suspected(options.suspects, n.number.key);
+  return may_be_out(n) && is_suspected(options.suspects, n.number.key);
 }
 
 std::vector<Contender> released_numbers(const Appraisal& appraisal, Released which,

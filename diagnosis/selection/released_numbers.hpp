@@ -8,7 +8,9 @@
 
 namespace vcnc {
 
-/// Whether a declared number may be told to be out of its tolerance.
+/// Whether a declared number has a tolerance that it may be out of.
+bool may_be_out(const FreedNumber& number);
+/// Whether it may be told to be.
 bool may_be_released(const DiagnosisOptions& options, const FreedNumber& number);
 
 /// Which of them: those that pull at their tolerance, or, where something was taken out that may

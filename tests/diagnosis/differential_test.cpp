@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "diagnosis/records/measured_table.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc {
@@ -101,6 +102,48 @@ TEST(LessHealthy, TakesTheMeanOffWhereALapHasNoPartnerThatCameAsLate) {
   const DifferentialRecord d = less_healthy(now, healthy(before));
   EXPECT_GT(left_of(d), 5 * toy::kPositionNoise);
   EXPECT_DOUBLE_EQ(scale_of_position(d), std::sqrt(1 + 1.0 / (kLaps - 1)));
+}
+
+/// Without laps of one of three motions, each a third of the time.
+Record without_motion(Record record, int condition) {
+  std::erase_if(record.stretches, [&](const Stretch& s) { return s.condition == condition; });
+  return record;
+}
+
+TEST(LessHealthy, ForgetsLapsOfAMotionThatTheHealthyRunHasNot) {
+  const Record now = measured(1);
+  const DifferentialRecord d = less_healthy(now, healthy(without_motion(measured(2), 2)));
+  EXPECT_EQ(d.record.stretches.size(), now.stretches.size() - kLaps);
+  EXPECT_TRUE(std::none_of(d.record.stretches.begin(), d.record.stretches.end(),
+                           [](const Stretch& s) { return s.condition == 2; }));
+  ASSERT_EQ(d.record.warnings.size(), 1u);
+  EXPECT_NE(d.record.warnings[0].find("33 % of the motions (by time) have no partner"),
+            std::string::npos)
+      << d.record.warnings[0];
+}
+
+TEST(LessHealthy, NamesASignalThatTheHealthyRunHasNot) {
+  HealthyRun run = healthy(measured(2));
+  std::erase_if(run.record.signals,
+                [](const MeasuredSignal& s) { return s.kind == SignalKind::force; });
+  const DifferentialRecord d = less_healthy(measured(1), run);
+  ASSERT_EQ(d.record.warnings.size(), 1u);
+  EXPECT_EQ(d.record.warnings[0], "The reference run has no force X: not compared.");
+}
+
+TEST(LessHealthy, IsRefusedWhereTheHealthyRunDoesNextToNothingOfIt) {
+  const HealthyRun run = healthy(without_motion(without_motion(measured(2), 0), 1));
+  Record now = without_motion(measured(1), 0);
+  EXPECT_NO_THROW(less_healthy(now, run));  // a half
+  now.stretches.erase(now.stretches.end() - kLaps + 1, now.stretches.end());
+  try {
+    less_healthy(now, run);
+    FAIL() << "a fifth of the motions is the same";
+  } catch (const MeasurementError& e) {
+    EXPECT_NE(std::string(e.what()).find("does only 20 % (by time) of the motions of toy"),
+              std::string::npos)
+        << e.what();
+  }
 }
 
 TEST(LessHealthy, GivesEveryLapTheUnknownForceOfTheOneThatCameAsLate) {

@@ -666,6 +666,29 @@ TEST(TrialValues, FrequenciesAreThoseTheReadingsRingWith) {
       std::any_of(tried.begin(), tried.end(), [](double f) { return std::abs(f - 47) < 1.5; }));
 }
 
+/// A wave of which the travel holds one: a pinion, an encoder off its centre.
+TEST(TrialValues, WavelengthsAreAsLongAsTheTravel) {
+  Record record = toy::commands(1000, 4);
+  const std::vector<double>& x = record.find(SignalKind::command, 0)->value;
+  const auto [low, high] = std::minmax_element(x.begin(), x.end());
+  const double period_mm = 1.1e3 * (*high - *low);
+  toy::measure(record,
+               toy::machine({{"effects.X.pitch_periodic.amplitude_um", 5},
+                             {"effects.X.pitch_periodic.period_mm", period_mm}}),
+               3);
+  toy::ToyReplica replica(record);
+  const Evidence evidence(record, replica, Machine());
+  const std::vector<Candidate> all = toy::candidates();
+  const Candidate& pitch = *std::find_if(
+      all.begin(), all.end(), [](const Candidate& c) { return c.effect == "pitch_periodic"; });
+  const TrialValuesOf values(evidence, Machine(), evidence.residual(evidence.predict(Machine())),
+                             0);
+  const std::vector<double> tried = values(pitch, 1);
+  EXPECT_TRUE(std::any_of(tried.begin(), tried.end(), [&](double p) {
+    return std::abs(p / period_mm - 1) < 0.2;
+  })) << ::testing::PrintToString(tried);
+}
+
 TEST(Evidence, APieceThatShiftsBetweenLapsIsNoNoise) {
   Record still = toy::commands(1000, 4), shifting = still;
   toy::measure(still, Machine(), 12);
@@ -742,6 +765,43 @@ TEST(Trials, ThePhaseIsThatOfTheAmplitudeThatDoesMost) {
       start_of(ripple, trial, Eigen::Vector4d(0, 0.5, 1, 0), Eigen::Vector4d(100, 100, 1, 1));
   EXPECT_NEAR(start[0].value, 20, 1e-9);
   EXPECT_NEAR(start[2].value, 90, 1e-9);
+}
+
+/// What a wave of the base machine becomes by another one of the same period is another amplitude
+/// and another phase, and both are seen by sensitivities.
+TEST(Trials, AWaveThatIsThereIsTurned) {
+  const std::string key = "effects.X.torque_ripple.";
+  const Candidate ripple{
+      "torque_ripple",
+      "X",
+      {{key + "amplitude_N", 40, 0, 1e5, true}, {key + "phase_deg", 0, -360, 360}},
+      {1}};
+  const auto wave = [&](const Machine& m) {
+    Eigen::VectorXd f(100);
+    for (Eigen::Index i = 0; i < f.size(); ++i)
+      f[i] = number_of(m, key + "amplitude_N") *
+             std::sin(0.3 * static_cast<double>(i) + number_of(m, key + "phase_deg") * kDegree);
+    return f;
+  };
+  const auto machine = [&](double amplitude, double phase) {
+    return toy::machine({{key + "amplitude_N", amplitude}, {key + "phase_deg", phase}});
+  };
+  const Machine base = machine(7, -62);
+  const Trial trial = trials(
+      base, {ripple}, [](const Candidate&, std::size_t) { return std::vector<double>{}; })[0];
+  ASSERT_EQ(trial.directions.size(), 2U);
+  Eigen::MatrixXd columns(100, 2);
+  for (Eigen::Index d = 0; d < 2; ++d)
+    columns.col(d) =
+        wave(machine_of(base, ripple, trial, trial.directions[static_cast<std::size_t>(d)])) -
+        wave(base);
+  EXPECT_NEAR(columns.col(1).norm(), columns.col(0).norm(), 0.1 * columns.col(0).norm());
+  const Eigen::VectorXd off = wave(machine(9, 40)),  // besides, so that the sum is 10.2 at -2 deg
+      size = columns.colPivHouseholderQr().solve(off);
+  const std::vector<FreedNumber> start = start_of(ripple, trial, size, Eigen::Vector2d(1, 1));
+  ASSERT_EQ(start.size(), 2U);
+  EXPECT_NEAR(start[0].value, 10.18, 0.2);
+  EXPECT_NEAR(start[1].value, -2.2, 1.5);
 }
 
 TEST(Trials, TheAngleOfAWeightIsAPhase) {

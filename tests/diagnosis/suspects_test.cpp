@@ -55,11 +55,10 @@ TEST(Suspects, OthersAreLeftOutAndWrongOnesRefused) {
 }
 
 /// What is found of `truth`, by its name or key.
-std::string found(const Machine& truth, const Words& suspects) {
+std::string found(const Machine& truth, const Words& suspects, const Machine& declared = {}) {
   Record record = toy::commands(1000, 4);
   toy::measure(record, truth, 7);
   toy::ToyReplica replica(record);
-  const Machine declared;
   Evidence evidence(record, replica, declared);
   DiagnosisOptions options;
   options.suspects = suspects;
@@ -78,6 +77,17 @@ TEST(Suspects, NothingElseIsFound) {
   EXPECT_EQ(found(leaning, {"X.coulomb"}), "");
   EXPECT_EQ(found(heavy, {"axes.X.load_kg"}), "axes.X.load_kg");
   EXPECT_EQ(found(heavy, {"geometry.squareness"}), "");
+}
+
+/// No declared number takes their place, though none may be found either.
+TEST(Suspects, AreNotHiddenByADeclaredNumberFarOutOfTolerance) {
+  const Machine declared = toy::machine({{"effects.X.coulomb.level_N", 60}});
+  for (const double viscous : {30, 60, 120})
+    EXPECT_EQ(found(toy::machine({{"effects.X.coulomb.level_N", 60},
+                                  {"effects.X.viscous.coefficient_Ns_per_m", viscous}}),
+                    {"X.viscous"}, declared),
+              "X.viscous")
+        << viscous;
 }
 
 }  // namespace

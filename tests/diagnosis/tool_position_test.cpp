@@ -210,6 +210,24 @@ TEST(ToolPosition, OnAGridIsWhereTheAxesAre) {
     }
 }
 
+/// That it leans out of the plane shows by its square alone, which no fit may use.
+TEST(ToolPosition, OnAGridTellsNothingOfWhatLiesAcrossIt) {
+  Record run = on_the_grid(1);
+  std::erase_if(run.signals, [](const MeasuredSignal& s) {
+    return s.kind == SignalKind::tool_position && s.axis == kZ;
+  });
+  const auto leans = change(run, "effects.setup.piece_tilt.tilt_urad.x", 2000),
+             higher = change(run, "effects.setup.piece_offset.shift_um.z", 500),
+             turned = change(run, "effects.setup.piece_tilt.tilt_urad.z", 100);
+  for (std::size_t k = 0; k < run.samples(); ++k)
+    for (std::size_t c = 0; c < 2; ++c) {
+      EXPECT_EQ(leans[c][k], 0);
+      EXPECT_EQ(higher[c][k], 0);
+    }
+  const auto [low, high] = std::minmax_element(turned[0].begin(), turned[0].end());
+  EXPECT_NEAR(*high - *low, 100e-6 * 2 * kRadius, 1e-9);
+}
+
 TEST(ToolPosition, ContourErrorIsAcrossTheWay) {
   const Record run = on_the_grid(2);
   const Machine model = trunnion();

@@ -397,6 +397,51 @@ TEST_F(Vcnc, InjectionsAreInTheRunInEveryLayout) {
   EXPECT_NE(machine.find("\nload_kg = 500.0\n"), std::string::npos);
 }
 
+TEST_F(Vcnc, WritesOverNothingButItsOwn) {
+  const std::string program = scratch_.write("mine.ngc", "G0 X1\nM30\n"),
+                    machine = scratch_.write("mine.toml", "name = \"mine\"\n"),
+                    on = " --machine " + configs("machines/trunnion.toml");
+  for (const std::string& command :
+       {" plan " + program + on + " --csv " + program,
+        " interpret " + program + " --json " + machine,
+        " program step" + on + " --axis X --step 1 --steps 1 --out " + program}) {
+    const Said said = shell(scratch_, bin("vcnc") + command);
+    EXPECT_EQ(said.code, 2) << command;
+    EXPECT_NE(said.err.find("exists and is no earlier output of this command"), std::string::npos)
+        << said.err;
+  }
+  EXPECT_EQ(read_text(program), "G0 X1\nM30\n");
+  EXPECT_EQ(read_text(machine), "name = \"mine\"\n");
+  const std::string csv = scratch_ / "plan.csv", json = scratch_ / "path.json",
+                    step = scratch_ / "step.ngc";
+  for (int twice = 0; twice < 2; ++twice)
+    for (const std::string& command :
+         {" plan " + program + on + " --csv " + csv, " interpret " + program + " --json " + json,
+          " program step" + on + " --axis X --step 1 --steps 1 --out " + step})
+      EXPECT_EQ(shell(scratch_, bin("vcnc") + command).code, 0) << command;
+}
+
+TEST_F(Vcnc, AFullDiskIsAFailureAndLeavesNothing) {
+  const std::string on = " --machine " + configs("machines/trunnion.toml"),
+                    program = scratch_.write("mine.ngc", "G1 F1000 X50\nM30\n");
+  for (const char* command : {"keys", "effects --markdown", "plan"}) {
+    const std::string words = command == std::string("plan") ? "plan " + program + on : command;
+    const Said said = shell(scratch_, "(" + bin("vcnc") + " " + words + " > /dev/full)");
+    EXPECT_EQ(said.code, 1) << words;
+    EXPECT_NE(said.err.find("standard output: cannot be written"), std::string::npos) << said.err;
+  }
+  const std::string limited = "ulimit -f 1; trap '' XFSZ; " + bin("vcnc");
+  for (const std::string& command : {" plan " + program + on + " --csv p.csv",
+                                     " program diagnosis" + on + " --set setup.piece=" +
+                                         configs("pieces/ring.toml") + " --out p.ngc"}) {
+    const Said said = shell(scratch_, "(cd " + (scratch_ / "") + "; " + limited + command + ")");
+    EXPECT_EQ(said.code, 1) << command << said.err;
+    EXPECT_NE(said.err.find("cannot be written completely"), std::string::npos) << said.err;
+  }
+  for (const char* left : {"p.csv", "p.csv.partial", "p.ngc", "p.ngc.partial"})
+    EXPECT_FALSE(std::filesystem::exists(scratch_ / left)) << left;
+}
+
 TEST_F(Vcnc, ProgramsOfEveryKindRunOnBothKinematics) {
   for (const std::string machine : {"trunnion", "head"}) {
     const auto generate_and_run = [&](const std::string& kind, const std::string& piece) {
