@@ -460,10 +460,11 @@ class Report {
     double most = 0;
     for (const auto& [channel, is, noise, was] : off) {
       const ShownUnit unit = shown_unit(channel);
-      d_.notes.push_back(fmt::format(
-          "{} is still off by {:.3g} {} rms on held-out laps, {:.3g} times "
-          "its noise; it was {:.3g}.",
-          channel_name(channel), is * unit.factor, unit.name, is / noise, was * unit.factor));
+      d_.notes.push_back(
+          fmt::format("{} is still off by {:.3g} {} rms{}, {:.3g} times its noise; it was {:.3g}.",
+                      channel_name(channel), is * unit.factor, unit.name,
+                      evidence_.partition().repeated ? " on held-out laps" : "", is / noise,
+                      was * unit.factor));
       if (is / noise > most) most = is / noise, d_.still_off = channel;
     }
   }

@@ -30,23 +30,29 @@ std::vector<StillOff> signals_still_off(const Evidence& evidence, const Diagnosi
                                         const std::vector<Chatter>& chatter, const Machine& before,
                                         const Machine& found) {
   std::vector<StillOff> off;
-  const Prediction found_to_be = evidence.predict(found);
-  const std::vector<double> before_rms =
-                                evidence.rms_within_laps(evidence.predict(before), Role::held_out),
-                            after = evidence.rms_within_laps(found_to_be, Role::held_out),
-                            fitted = evidence.rms_within_laps(found_to_be, Role::fitted);
+  const bool laps = evidence.partition().repeated;
+  const Prediction was_to_be = evidence.predict(before), found_to_be = evidence.predict(found);
+  const auto rms_of = [&](const Prediction& p, Role role) {
+    return evidence.rms_within_laps(p, role);
+  };
+  const std::vector<double> before_rms = rms_of(was_to_be, Role::held_out),
+                            before_fitted = rms_of(was_to_be, Role::fitted),
+                            after = rms_of(found_to_be, Role::held_out),
+                            fitted = rms_of(found_to_be, Role::fitted);
   for (std::size_t c = 0; c < after.size(); ++c) {
     const ComparedChannel& channel = evidence.replica().channels()[c];
     const double n = evidence.count(c, Role::held_out);
     if (n < kFewSamples || is_stirred(chatter, channel)) continue;
     const double form = c < options.form_of_channel.size() ? options.form_of_channel[c] / n : 0,
-                 noise = evidence.reckoned_with(c) * std::sqrt(1 + form), was = before_rms[c],
-                 is = after[c];
+                 noise = evidence.reckoned_with(c) * std::sqrt(1 + form),
+                 was = laps ? before_rms[c] : std::max(before_rms[c], before_fitted[c]),
+                 is = laps ? after[c] : std::max(after[c], fitted[c]);
     const auto beyond = [&](double rms) {
       return std::sqrt(std::max(0.0, rms * rms - noise * noise));
     };
     const double loud = std::max(kLoud * noise, 0.5 * evidence.step_of(c));
-    if (std::min(is, fitted[c]) < loud || beyond(is) < kWrongOfFound * beyond(was)) continue;
+    if (is < loud || (laps && fitted[c] < loud) || beyond(is) < kWrongOfFound * beyond(was))
+      continue;
     if (is_length(channel) && beyond(is) * 1e6 < options.least_contour_um) continue;
     off.push_back({channel, is, noise, was});
   }

@@ -13,7 +13,8 @@ constexpr double kUsual = 1;           ///< decades about the typical size, or o
 constexpr double kUsualShape = 2;      ///< decades about the typical period, speed or time
 constexpr double kOfTolerances = 0.3;  ///< numbers, for a decade of tolerances more
 constexpr double kNothing = 0.03;      ///< of a typical size
-constexpr double kByAnArm = 0.1;  ///< numbers: of equals, what displaces is told, not what turns
+/// Numbers: of equals, what displaces is told, not what turns, and be it out of tolerance by far.
+constexpr double kByAnArm = 0.6;
 
 /// Decades that a size is further from the typical one, which is 1, than is usual.
 double unusual(double size, double usual) {
