@@ -573,6 +573,8 @@ void load_tables(Machine& machine, const std::string& path) {
 Machine load_machine(const std::string& path, const std::vector<std::string>& assignments,
                      const std::vector<std::string>& injections) {
   toml::table table = parse(read_file(path), path);
+  if (table.empty())
+    throw ConfigError(path + ": says nothing; a machine file has at least a name or an axis");
   const toml::node* file_piece = table["setup"]["piece"].node();
   fs::path base = file_piece ? fs::absolute(path).parent_path() : fs::current_path();
   fs::path program_base = fs::absolute(path).parent_path();

@@ -22,6 +22,7 @@ struct FreedNumber {
   double tolerance = 0;  ///< standard deviation of the declaration; 0: nothing is known
   bool shape = false;    ///< frequency, time constant, ...: moved in small steps
   bool held = false;     ///< at its declaration, as if it were exact
+  double ragged = 0;     ///< what its interval is wider by, in quadrature (look_about.hpp)
 
   /// The same in the healthy run (common_numbers.hpp): counted from what is declared.
   bool common() const { return number.key.starts_with(kCommon); }

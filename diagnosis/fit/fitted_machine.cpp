@@ -481,6 +481,14 @@ FittedMachine within_tolerance(Evidence& evidence, FittedMachine m, double toler
   return m;
 }
 
+void settle_at(Evidence& evidence, FittedMachine& m) {
+  m.machine = with(with(m.machine, m.numbers()), m.nuisances.numbers);
+  anchor_at(evidence, m);
+  m.columns = columns_of(evidence, m.machine, m.prediction, m.numbers());
+  m.held_out = Ground(evidence, m.residual, m.linear()).held_out;
+  converge_exactly(evidence, m);
+}
+
 void settle_in(Evidence& evidence, FittedMachine& m, const NoUse& no_use) {
   constexpr double kNoGainYet = std::numeric_limits<double>::infinity();
   anchor_at(evidence, m);

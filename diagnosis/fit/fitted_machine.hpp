@@ -87,6 +87,9 @@ void add_common(const Evidence& evidence, FittedMachine& machine,
 /// anywhere.
 void hold_common(FittedMachine& machine);
 
+/// Takes its numbers for what they are and fits from there, where the replica is exact.
+void settle_at(Evidence& evidence, FittedMachine& machine);
+
 /// Makes the replica exact at the machine and computes anew what it leaves.
 void anchor_at(Evidence& evidence, FittedMachine& machine);
 

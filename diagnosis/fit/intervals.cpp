@@ -156,7 +156,8 @@ std::map<std::string, Interval> intervals_of(const Evidence& evidence, const Fit
       const double unit = number.number.typical, known = size_of(machine, number) / unit;
       const auto at = static_cast<Eigen::Index>(j);
       const double form = inexact ? std::hypot(widths.form[at], kNormal95 * kKnownTo * known) : 0;
-      intervals[number.number.key].*width = std::hypot(widths.noise[at], form) * unit;
+      intervals[number.number.key].*width =
+          std::hypot(std::hypot(widths.noise[at], form) * unit, number.ragged);
     }
   };
   fill(every, &Interval::half_width);

@@ -7,7 +7,8 @@
 // quadrature instead of the last: the scatter between the conditions of the run, by Student's t
 // and 1.3 for what so few of them miss, since what a model gets wrong is alike in all laps of a
 // condition; and 4 % of the largest amplitude of the effect, since no law of an effect is known
-// better than to two percent. Both were set on machines of the second generator.
+// better than to two percent. Where chi-square is ragged about a number, its interval is as wide as
+// that (look_about.hpp). Both were set on machines of the second generator.
 #pragma once
 
 #include <map>

@@ -6,6 +6,7 @@
 
 #include <vector>
 
+#include "diagnosis/fit/fitted_machine.hpp"
 #include "diagnosis/screening/detection_limits.hpp"
 #include "diagnosis/selection/contest_rules.hpp"
 

@@ -7,6 +7,8 @@
 #include <optional>
 #include <set>
 
+#include "diagnosis/fit/intervals.hpp"
+#include "diagnosis/fit/look_about.hpp"
 #include "diagnosis/screening/detection_limits.hpp"
 #include "diagnosis/selection/contest.hpp"
 #include "diagnosis/selection/exchange.hpp"
@@ -53,6 +55,11 @@ class Search {
     // Where nothing is found, it was a matter of tolerance after all.
     if (result_.found.found() == 0) result_.found = result_.base = fitted;
     evidence_.anchor(result_.found.machine);
+    if (going_)
+      unless_stopped([this] {
+        const bool inexact = is_inexact(evidence_, options_, rules_.floor, result_.found.held_out);
+        look_about(evidence_, result_.found, rough_numbers(), inexact, options_.least_gain);
+      });
     if (going_ && result_.found.found() > 0)
       unless_stopped([this] {
         result_.beside_found = limits_beside(rules_, result_.base, result_.found, needed());
@@ -92,6 +99,18 @@ class Search {
     } catch (const Stopped&) {
     }
     evidence_.stop_when({});
+  }
+
+  /// Keys of amplitudes that decide how an axis sticks, slips or rattles.
+  std::vector<std::string> rough_numbers() const {
+    std::vector<std::string> keys;
+    for (const AddedEffect& a : result_.found.added) {
+      const Family family = candidates_[a.candidate].family;
+      if (family != Family::friction && family != Family::mechanics) continue;
+      for (const FreedNumber& n : a.numbers)
+        if (!n.shape && !is_phase(n.number)) keys.push_back(n.number.key);
+    }
+    return keys;
   }
 
   /// What is found, as far as it is settled, stands in `best_`.

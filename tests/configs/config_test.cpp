@@ -31,6 +31,12 @@ TEST(Config, ValuesInTheKeysUnitBecomeSi) {
   EXPECT_DOUBLE_EQ(m.effects.axis[kX].get<Backlash>().gap, 10e-6);
 }
 
+TEST(Config, AMachineFileThatSaysNothingIsNone) {
+  const TemporaryFile empty("empty.toml", "# later\n");
+  EXPECT_NE(error_of([&] { load_machine(empty.path()); }).find("empty.toml: says nothing"),
+            std::string::npos);
+}
+
 TEST(Config, EveryShippedMachineLoadsWithItsPiece) {
   std::size_t count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(kMachines)) {

@@ -1,11 +1,13 @@
 #include "diagnosis/records/measured_table.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <random>
 
 #include "diagnosis/records/time_base.hpp"
+#include "tests/scratch.hpp"
 
 namespace vcnc::measured_table_test {
 namespace {
@@ -34,6 +36,13 @@ TEST(MeasuredTable, ReadsEverySeparatorQuotesRemarksAndUnitLines) {
     EXPECT_EQ(table.columns[1].value[0], 1.5) << text;
     EXPECT_EQ(table.columns[1].value[1], -2e-3) << text;
   }
+}
+
+TEST(MeasuredTable, APipeIsRefusedAndNotWaitedFor) {
+  const Scratch folder;
+  const std::string pipe = folder / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THROW(read_measured_table(pipe, {}), MeasurementError);
 }
 
 TEST(MeasuredTable, WithoutHeadingsColumnsAreCalledByTheirNumbers) {
