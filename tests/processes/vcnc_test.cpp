@@ -4,6 +4,7 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 #include <thread>
 
@@ -440,6 +441,29 @@ TEST_F(Vcnc, AFullDiskIsAFailureAndLeavesNothing) {
   }
   for (const char* left : {"p.csv", "p.csv.partial", "p.ngc", "p.ngc.partial"})
     EXPECT_FALSE(std::filesystem::exists(scratch_ / left)) << left;
+}
+
+/// HDF5 looks at its files once more when a program ends.
+TEST_F(Vcnc, AnImportToAFullDiskEndsWithItsMessage) {
+  std::string table = "q,p\n";
+  for (int k = 0; k < 3000; ++k) {
+    const double q = 50 * std::sin(0.002 * k), p = 50 * std::sin(0.002 * (k - 4));
+    table += std::to_string(q) + "," + std::to_string(p) + "\n";
+  }
+  scratch_.write("run.csv", table);
+  scratch_.write("map.toml",
+                 "[time]\nrate_hz = 1000\n"
+                 "[[signals]]\ncolumn = \"q\"\nkind = \"command\"\naxis = \"X\"\nunit = \"mm\"\n"
+                 "[[signals]]\ncolumn = \"p\"\nkind = \"position\"\naxis = \"X\"\nunit = \"mm\"\n");
+  const std::string import = bin("vcnc") + " import run.csv --map map.toml --out run.h5",
+                    in = "(cd " + (scratch_ / "") + "; ";
+  const Said said = shell(scratch_, in + "ulimit -f 8; trap '' XFSZ; " + import + ")");
+  EXPECT_EQ(said.code, 2) << said.err;
+  EXPECT_NE(said.err.find("the record cannot be written: File too large"), std::string::npos)
+      << said.err;
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "run.h5"));
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "run.h5.partial"));
+  EXPECT_EQ(shell(scratch_, in + import + ")").code, 0);
 }
 
 TEST_F(Vcnc, ProgramsOfEveryKindRunOnBothKinematics) {
