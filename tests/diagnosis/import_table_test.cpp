@@ -2,12 +2,8 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -973,33 +969,6 @@ TEST_F(RecordFile, AFolderThatIsNotThereIsSaid) {
   } catch (const MeasurementError& e) {
     EXPECT_NE(std::string(e.what()).find("there is no folder"), std::string::npos) << e.what();
   }
-}
-
-// A file size limit stands for the full disk; in a child because the limit cannot be taken back.
-TEST_F(RecordFile, AFullDiskIsOneClearErrorAndLeavesNothing) {
-  Record record = imported(sound_map());
-  for (MeasuredSignal& s : record.signals) s.value.resize(20000);
-  const pid_t child = fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{50'000, 50'000};
-    setrlimit(RLIMIT_FSIZE, &limit);
-    int code = 1;
-    try {
-      write_record(record, folder_ / "run.h5");
-    } catch (const MeasurementError& e) {
-      const std::string text = e.what();
-      code = text.find("cannot be written: File too large") != std::string::npos ? 0 : 2;
-    }
-    _exit(code);
-  }
-  int status = 0;
-  waitpid(child, &status, 0);
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 0);
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "run.h5"));
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "run.h5.partial"));
 }
 
 TEST_F(RecordFile, AChangedOrForeignFileIsRefused) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 
 #include "diagnosis/fit/intervals.hpp"
 #include "toy_machine.hpp"
@@ -38,39 +39,43 @@ TEST(TimesWider, EndsWhereNobodyLooked) {
   EXPECT_EQ(times_wider({0, -1, 1}, {0, 5, 1}), 1);  // a parabola is through any three
 }
 
+/// A toy with a viscous friction of X, that of the truth, fitted.
+struct Fitted {
+  Fitted() {
+    toy::measure(record, toy::machine({{key, 300}}), 5);
+    evidence.emplace(record, replica, Machine());
+    machine = fit_declared(*evidence, Machine());
+    machine.added.push_back({.numbers = {{.number = {key, 2000, 0, 1e6, true}, .value = 300}}});
+    settle_at(*evidence, machine);
+  }
+  double value() const { return machine.added[0].numbers[0].value; }
+  double half_width() const { return intervals_of(*evidence, machine).at(key).half_width; }
+
+  const std::string key = "effects.X.viscous.coefficient_Ns_per_m";
+  Record record = toy::commands(1000, 4);
+  toy::ToyReplica replica{record};
+  std::optional<Evidence> evidence;
+  FittedMachine machine;
+};
+
 /// In a machine that is linear in it, a number and its interval stay as they are.
 TEST(LookAbout, LeavesASmoothNumberAlone) {
-  Record record = toy::commands(1000, 4);
-  toy::measure(record, toy::machine({{"effects.X.viscous.coefficient_Ns_per_m", 300}}), 5);
-  toy::ToyReplica replica(record);
-  Evidence evidence(record, replica, Machine());
-  const std::string key = "effects.X.viscous.coefficient_Ns_per_m";
-  FittedMachine m = fit_declared(evidence, Machine());
-  m.added.push_back({.numbers = {{.number = {key, 2000, 0, 1e6, true}, .value = 300}}});
-  settle_at(evidence, m);
-  const double value = m.added[0].numbers[0].value,
-               half = intervals_of(evidence, m).at(key).half_width;
-  look_about(evidence, m, {key}, false, 25);
-  EXPECT_NEAR(m.added[0].numbers[0].value, value, 0.01 * half);
-  EXPECT_NEAR(intervals_of(evidence, m).at(key).half_width, half, 0.1 * half);
+  Fitted f;
+  const double value = f.value(), half = f.half_width();
+  look_about(*f.evidence, f.machine, {f.key}, false, 25);
+  EXPECT_NEAR(f.value(), value, 0.01 * half);
+  EXPECT_NEAR(f.half_width(), half, 0.1 * half);
 }
 
 /// From a value far beside, it begins again where less is left.
 TEST(LookAbout, BeginsAgainWhereLessIsLeft) {
-  Record record = toy::commands(1000, 4);
-  toy::measure(record, toy::machine({{"effects.X.viscous.coefficient_Ns_per_m", 300}}), 5);
-  toy::ToyReplica replica(record);
-  Evidence evidence(record, replica, Machine());
-  const std::string key = "effects.X.viscous.coefficient_Ns_per_m";
-  FittedMachine m = fit_declared(evidence, Machine());
-  m.added.push_back({.numbers = {{.number = {key, 2000, 0, 1e6, true}, .value = 300}}});
-  settle_at(evidence, m);
-  const double half = intervals_of(evidence, m).at(key).half_width;
-  m.added[0].numbers[0].value = 300 - 6 * half;
-  move_number(m.machine, key, 300 - 6 * half);
-  anchor_at(evidence, m);
-  look_about(evidence, m, {key}, false, 25);
-  EXPECT_NEAR(m.added[0].numbers[0].value, 300, 2 * half);
+  Fitted f;
+  const double half = f.half_width();
+  f.machine.added[0].numbers[0].value = 300 - 6 * half;
+  move_number(f.machine.machine, f.key, 300 - 6 * half);
+  anchor_at(*f.evidence, f.machine);
+  look_about(*f.evidence, f.machine, {f.key}, false, 25);
+  EXPECT_NEAR(f.value(), 300, 2 * half);
 }
 
 }  // namespace
