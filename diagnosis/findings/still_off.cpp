@@ -12,6 +12,9 @@ namespace {
 /// Part of what a signal was off by before that a model of what was found may be wrong by.
 constexpr double kWrongOfFound = 0.05;
 
+/// Times its noise by which a signal is off in what was fitted alone, where nothing was repeated.
+constexpr double kLoudAlone = 5;
+
 /// A position of a linear axis, or where the tool is.
 bool is_length(const ComparedChannel& channel) {
   return is_reading(channel.kind) ||
@@ -44,15 +47,14 @@ std::vector<StillOff> signals_still_off(const Evidence& evidence, const Diagnosi
     const double n = evidence.count(c, Role::held_out);
     if (n < kFewSamples || is_stirred(chatter, channel)) continue;
     const double form = c < options.form_of_channel.size() ? options.form_of_channel[c] / n : 0,
-                 noise = evidence.reckoned_with(c) * std::sqrt(1 + form),
-                 was = laps ? before_rms[c] : std::max(before_rms[c], before_fitted[c]),
-                 is = laps ? after[c] : std::max(after[c], fitted[c]);
+                 noise = evidence.reckoned_with(c) * std::sqrt(1 + form);
+    const bool alone = !laps && fitted[c] > std::max(after[c], kLoudAlone * noise);
+    const double was = alone ? before_fitted[c] : before_rms[c], is = alone ? fitted[c] : after[c];
     const auto beyond = [&](double rms) {
       return std::sqrt(std::max(0.0, rms * rms - noise * noise));
     };
     const double loud = std::max(kLoud * noise, 0.5 * evidence.step_of(c));
-    if (is < loud || (laps && fitted[c] < loud) || beyond(is) < kWrongOfFound * beyond(was))
-      continue;
+    if (std::min(is, fitted[c]) < loud || beyond(is) < kWrongOfFound * beyond(was)) continue;
     if (is_length(channel) && beyond(is) * 1e6 < options.least_contour_um) continue;
     off.push_back({channel, is, noise, was});
   }

@@ -17,7 +17,7 @@ inline constexpr double kLoud = 1.5;
 /// Whether an axis that vibrates by itself moves a signal.
 bool is_stirred(const std::vector<Chatter>& chatter, const ComparedChannel& channel);
 
-/// RMS on held-out laps; where nothing was repeated, of the half that is further off [SI].
+/// RMS on held-out laps, or of what was fitted where that alone is off [SI].
 struct StillOff {
   ComparedChannel channel;
   double is, noise, was;
@@ -25,8 +25,9 @@ struct StillOff {
 
 /// Signals that are still off by more than noise, and by more of what `before` was off than a
 /// model of something that was found may be wrong by, on fitted and on held-out laps: what one
-/// lap does alone is no deviation. Where nothing was repeated, one of the two is enough: each of
-/// them has motions that the other has not. Not those that an axis which vibrates by itself moves.
+/// lap does alone is no deviation. Where nothing was repeated, what was fitted is enough if it is
+/// off by far: it has motions that the rest has not. Not those that an axis which vibrates by
+/// itself moves.
 std::vector<StillOff> signals_still_off(const Evidence& evidence, const DiagnosisOptions& options,
                                         const std::vector<Chatter>& chatter, const Machine& before,
                                         const Machine& found);
