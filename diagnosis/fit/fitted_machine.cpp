@@ -463,12 +463,12 @@ void converge_anew(const Evidence& evidence, FittedMachine& m) {
 }
 
 FittedMachine within_tolerance(Evidence& evidence, FittedMachine m, double tolerances,
-                               const std::function<bool(const FreedNumber&)>& may_be_found) {
+                               const std::function<bool(const FreedNumber&)>& may_be_out_of_one) {
   constexpr int kOneAfterTheOther = 3;
   for (int round = 0; round < kOneAfterTheOther; ++round) {
     bool any = false;
     for (FreedNumber& n : m.nuisances.numbers) {
-      if (n.held || std::abs(n.pull()) <= tolerances || !may_be_found(n)) continue;
+      if (n.held || std::abs(n.pull()) <= tolerances || !may_be_out_of_one(n)) continue;
       n.held = any = true;
       n.value = n.centre;
     }

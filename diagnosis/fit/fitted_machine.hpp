@@ -72,9 +72,9 @@ std::set<std::string> drives_found(const FittedMachine& machine,
 void converge(const Evidence& evidence, FittedMachine& machine);
 
 /// With declared numbers that were pulled further than some tolerances held at their declaration,
-/// of those that may be found: what is so far off is no matter of tolerance.
+/// of those that may be out of one: what is so far off is no matter of tolerance.
 FittedMachine within_tolerance(Evidence& evidence, FittedMachine machine, double tolerances,
-                               const std::function<bool(const FreedNumber&)>& may_be_found);
+                               const std::function<bool(const FreedNumber&)>& may_be_out_of_one);
 
 /// Takes the sensitivities of all declared numbers where the machine stands, then fits as above.
 void converge_anew(const Evidence& evidence, FittedMachine& machine);

@@ -45,7 +45,7 @@ class MachineChanges {
   void drop_uncounted(FittedMachine& m) const;
   /// Without one of its effects, everything else as it was.
   FittedMachine taken_out(const FittedMachine& m, std::size_t i, Common common) const;
-  /// With declared numbers that are pulled further held, of those that may be found.
+  /// With declared numbers that are pulled further held, of those that have one.
   FittedMachine within_tolerance(const FittedMachine& m, double tolerances) const;
 
   /// What counts with all declared numbers within their tolerances: what pulls them further
