@@ -7,10 +7,27 @@
 
 namespace vcnc {
 
-ProgressLine::ProgressLine() : terminal_(::isatty(STDERR_FILENO) == 1) {}
+namespace {
+
+constexpr std::chrono::seconds kNowAndThen{30};
+
+}  // namespace
+
+ProgressLine::ProgressLine()
+    : terminal_(::isatty(STDERR_FILENO) == 1),
+      begun_(std::chrono::steady_clock::now()),
+      told_(begun_) {}
 
 void ProgressLine::show(const std::string& text) {
-  if (!terminal_ || (shown_ && text == text_)) return;
+  if (!terminal_) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - told_ < kNowAndThen) return;
+    told_ = now;
+    const auto since = std::chrono::duration_cast<std::chrono::seconds>(now - begun_);
+    std::cerr << "after " << since.count() << " s: " << text << std::endl;
+    return;
+  }
+  if (shown_ && text == text_) return;
   text_ = text;
   winsize size{};
   ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size);

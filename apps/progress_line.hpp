@@ -1,6 +1,8 @@
-// One line on the terminal that is written over; nothing where stderr is not a terminal.
+// What is being done. On a terminal one line that is written over; elsewhere, so that long work
+// does not look like none, a line now and then.
 #pragma once
 
+#include <chrono>
 #include <string>
 
 namespace vcnc {
@@ -14,6 +16,7 @@ class ProgressLine {
 
  private:
   bool terminal_;
+  std::chrono::steady_clock::time_point begun_, told_;
   bool shown_ = false;
   std::string text_;
 };

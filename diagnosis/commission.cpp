@@ -157,7 +157,8 @@ class Commissioner {
     for (const std::string& key : at_most)
       result_.warnings.push_back(key +
                                  " went to the end of what is allowed: it stands for "
-                                 "something else, which the model lacks");
+                                 "something else, which the model lacks; with this run as "
+                                 "--reference a diagnosis does not hang on it");
     for (const SignalFigure& f : result_.figures)
       if (f.after > kWellOff * f.floor) tell_what_stays_off(f);
   }

@@ -110,7 +110,7 @@ struct ServoParams {
           "sampled controller: from the sample to the force it demands");
     visit("velocity_ff", p.velocity_ff, unit::none, Range{0, 2}, "velocity feed-forward, 1 = full");
     visit("acceleration_ff", p.acceleration_ff, unit::none, Range{0, 2},
-          "acceleration feed-forward, 1 = full");
+          "acceleration feed-forward, 1 = the force that the declared inertia needs");
     visit("current_lag_us", p.current_lag, unit::us, Range{0, 5000}, "lag of the current loop");
     visit("position_lag_us", p.position_lag, unit::us, Range{0, 5000},
           "lag of the position loop of a cascade: half its cycle, and its computing time; "
@@ -124,8 +124,10 @@ struct ServoParams {
           "lag of a cascade's feed-forward of velocity and acceleration; of differences of "
           "set-points "
           "half a cycle and more");
-    visit.choice("feedback", p.feedback, {{"motor", Feedback::motor}, {"load", Feedback::load}},
-                 "measuring system: indirect (motor) or direct (load)");
+    visit.choice(
+        "feedback", p.feedback, {{"motor", Feedback::motor}, {"load", Feedback::load}},
+        "measuring system of the position loop: indirect (motor) or direct (load); the speed is "
+        "the motor's");
   }
 };
 

@@ -199,21 +199,30 @@ void linearise(const Evidence& evidence, FittedMachine& m, const std::vector<std
     m.nuisances.columns[which[i]] = std::move(columns[i]);
 }
 
-/// Chi-square that no further look is worth: little, and little of what is more than noise.
+/// Chi-square that no further look is worth: little, and little of what is more than noise; less
+/// little where that is far more, since something is missing then that will ask for other numbers.
 double settled(const Evidence& evidence, const FittedMachine& m) {
-  return 5 + 1e-4 * std::max(0.0, m.held_out - evidence.count(Role::held_out));
+  constexpr double kLittle = 1e-4, kFarMore = 10;
+  const double noise = evidence.count(Role::held_out), excess = std::max(0.0, m.held_out - noise);
+  return 5 + kLittle * excess * std::clamp(excess / noise, 1.0, kFarMore);
 }
 
 /// Fits where the replica is exact: what is found there may be where it is not any more.
 void converge_exactly(Evidence& evidence, FittedMachine& m, const NoUse& no_use = {}) {
-  constexpr int kAnchors = 4;
+  constexpr int kAnchors = 4, kInVain = 2;
+  double least = misfit(evidence, m);
+  int in_vain = 0;  // some go around in a circle
   for (int i = 0; i < kAnchors; ++i) {
     const double before = m.held_out;
     converge(evidence, m);
     const double there = misfit(evidence, m);
     anchor_at(evidence, m);
-    if (std::abs(there - misfit(evidence, m)) < settled(evidence, m)) break;
+    const double here = misfit(evidence, m), little = settled(evidence, m);
+    if (std::abs(there - here) < little) break;
     if (no_use.given_up(m.held_out, kAnchors * (before - m.held_out))) break;
+    in_vain = here < least - little ? 0 : in_vain + 1;
+    if (in_vain == kInVain) break;
+    least = std::min(least, here);
   }
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <thread>
 #include <utility>
 
 #include "diagnosis/candidates/effect_stage.hpp"
@@ -240,8 +239,8 @@ std::vector<AxisReplay> replay_late(AxisDriveOf<Real> drive, std::size_t axis,
   return replay_lanes<Real>(drive, axis, variants, motion, kLateTruth, nothing);
 }
 
-/// Fewer drives than this are stepped one after the other.
-constexpr std::size_t kWorthLanes = 3;
+/// Fewer drives than this are stepped each alone: as many as there are lanes cost as much as five.
+constexpr std::size_t kWorthLanes = 6;
 
 }  // namespace
 
@@ -315,26 +314,27 @@ std::vector<AxisReplay> replay_variants(const std::vector<AxisVariant>& variants
     left.push_back(i);
     drives.emplace_back(variants[i].hypothesis, axis, kSeed);
   }
-  // Few of them are shared by all threads.
-  const std::size_t threads = std::max(1U, std::thread::hardware_concurrency()),
-                    most = std::clamp((left.size() + threads - 1) / threads, kWorthLanes, kLanes);
-  std::vector<std::vector<std::size_t>> groups;
+  std::vector<std::vector<std::size_t>> groups, singles;
   while (!left.empty()) {
-    std::vector<std::size_t>& group = groups.emplace_back();
-    std::vector<std::size_t> rest;
+    std::vector<std::size_t> group, rest;
     for (const std::size_t i : left) {
-      const bool alone = group.empty();
-      const bool joins = alone || (group.size() < most && drives[i].suits(drives[group.front()]));
+      const bool joins =
+          group.empty() || (group.size() < kLanes && drives[i].suits(drives[group.front()]));
       (joins ? group : rest).push_back(i);
     }
     left = std::move(rest);
+    if (group.size() < kWorthLanes)
+      for (const std::size_t i : group) singles.push_back({i});
+    else
+      groups.push_back(std::move(group));
   }
+  groups.insert(groups.end(), singles.begin(), singles.end());  // what takes longest comes first
   parallel_for(groups.size(), [&](std::size_t g) {
     const std::vector<std::size_t>& group = groups[g];
-    if (group.size() < kWorthLanes) {
-      for (const std::size_t i : group)
-        replays[i] =
-            std::move(replay_late<double>(std::move(drives[i]), axis, {variants[i]}, motion)[0]);
+    if (group.size() == 1) {
+      const std::size_t i = group.front();
+      replays[i] =
+          std::move(replay_late<double>(std::move(drives[i]), axis, {variants[i]}, motion)[0]);
       return;
     }
     std::vector<AxisDrive> together;

@@ -89,20 +89,38 @@ std::string without_commands(const Record& record) {
   return axes.empty() ? axes : fmt::format(" (no column is the command of {})", axes);
 }
 
-/// Where the tool is, no fault changes by a millimetre.
-void check_zero(const Record& record, const Reading& r) {
-  std::vector<double> off;
+/// How far a reading is off, lowest, middle and highest.
+struct FarOff {
+  double low = 0, middle = 0, high = 0;
+};
+
+FarOff far_off(const Reading& r) {
+  std::vector<double> all;
   for (std::size_t k = 0; k < r.predicted.size(); ++k)
     if (const double by = r.measured->value[k] - r.predicted[k]; std::isfinite(by))
-      off.push_back(by);
-  if (off.empty()) return;
-  const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
-  std::nth_element(off.begin(), middle, off.end());
-  if (std::abs(*middle) < kNoFault) return;
+      all.push_back(by);
+  if (all.empty()) return {};
+  std::sort(all.begin(), all.end());
+  return {all.front(), all[all.size() / 2], all.back()};
+}
+
+/// Where the tool is, no fault changes by a millimetre.
+void check_zero(const Record& record, const Reading& r) {
+  const FarOff by = far_off(r);
+  if (std::abs(by.middle) < kNoFault || by.high - by.low > kNoFault) return;
+  throw MeasurementError(
+      fmt::format("{}: {} is {:.6g} mm off what the machine of the model would read, always the "
+                  "same; check zero_mm",
+                  record.source, name(*r.measured), 1e3 * by.middle));
+}
+
+void check_place(const Record& record, const Reading& r) {
+  const FarOff by = far_off(r);
+  if (std::abs(by.middle) < kNoFault) return;
   throw MeasurementError(fmt::format(
       "{}: {} is {:.3g} mm off what the machine of the model would read; check its unit and scale, "
       "zero_mm, and the commands of the axes: sign, unit, one for another{}",
-      record.source, name(*r.measured), 1e3 * *middle, without_commands(record)));
+      record.source, name(*r.measured), 1e3 * by.middle, without_commands(record)));
 }
 
 /// Whether a reading goes as far as no fault does, so that it must go as it is predicted. The ball
@@ -142,6 +160,10 @@ void check_readings(const Record& record, const std::vector<ComparedChannel>& ch
                                            record.source, name(*a.measured), name(*b.measured)));
   check_unit(record, readings);
   for (const Reading& r : readings) check_unit_of_one(record, r);
+  for (std::size_t c = 0; c < channels.size(); ++c)
+    if (const MeasuredSignal* s = record.find(channels[c].kind, channels[c].axis);
+        s && s->kind == SignalKind::tool_position)
+      check_place(record, {s, predicted[c]});
 }
 
 }  // namespace vcnc

@@ -16,6 +16,7 @@ namespace {
 constexpr double kClearLoss = 4;  ///< times the least gain: no need to look closer
 /// Times what two effects of one place make together that each makes and the other takes back.
 constexpr double kCancels = 25;
+constexpr double kSpoils = 3;    ///< times the rms of a signal before
 constexpr double kAtTheEnd = 2;  ///< times the least that a shape may be
 
 Explained minus(Explained x, const std::vector<double>& y) {
@@ -220,7 +221,15 @@ double MachineChanges::far_more_than(const FittedMachine& m) const {
 }
 
 bool MachineChanges::holds_up(const FittedMachine& m) const {
-  return !cancels(m) && !is_another_law(m) && !contradicts_controller(m);
+  return !spoils(m) && !cancels(m) && !is_another_law(m) && !contradicts_controller(m);
+}
+
+bool MachineChanges::spoils(const FittedMachine& m) const {
+  for (std::size_t c = 0; c < m.prediction.size(); ++c)
+    if (evidence_.rms(m.prediction, c, Role::held_out) >
+        kSpoils * evidence_.rms(base_.prediction, c, Role::held_out))
+      return true;
+  return false;
 }
 
 bool MachineChanges::cancels(const FittedMachine& m) const {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/healthy/common_numbers.hpp"
+#include "diagnosis/selection/machine_changes.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc::selection_test {
@@ -567,6 +568,30 @@ TEST(Selection, TwoOfOneDriveThatTakeEachOtherBackAreNotTold) {
     const SelectionResult result = select_effects_of(evidence, {}, all, {}, {});
     EXPECT_EQ(result.found.added.size() == 2, all[1].place == "Y");
   }
+}
+
+TEST(Selection, WhatSpoilsASignalDoesNotHoldUp) {
+  Record record = toy::commands(1000, 4);
+  toy::measure(record, {}, 31);
+  toy::ToyReplica replica(record);
+  const Machine declared;
+  Evidence evidence(record, replica, declared);
+  const std::vector<Candidate> candidates = toy::candidates();
+  const DiagnosisOptions options;
+  std::vector<TrialColumns> trials;
+  const FittedMachine base = fit_declared(evidence, declared);
+  const ContestRules rules{
+      evidence, candidates, options, trials,
+      {},       0,          {},      [](const std::string&, double) { return true; }};
+  const MachineChanges changes(evidence, declared, rules, base);
+  const auto holds_up = [&](double delay_ms) {
+    FittedMachine m = base;
+    move_number(m.machine, "effects.X.command_delay.delay_ms", delay_ms);
+    m.prediction = evidence.predict(m.machine);
+    return changes.holds_up(m);
+  };
+  EXPECT_TRUE(holds_up(1e-4));   // a position off by 26 nm beside 50 nm of noise
+  EXPECT_FALSE(holds_up(1e-2));  // by 2.6 um
 }
 
 /// What it measures lies somewhere.
