@@ -1,5 +1,6 @@
 #include "apps/progress_line.hpp"
 
+#include <fmt/format.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -9,22 +10,18 @@ namespace vcnc {
 
 namespace {
 
-constexpr std::chrono::seconds kNowAndThen{30};
+constexpr double kNowAndThen = 30;  // [s]
 
 }  // namespace
 
-ProgressLine::ProgressLine()
-    : terminal_(::isatty(STDERR_FILENO) == 1),
-      begun_(std::chrono::steady_clock::now()),
-      told_(begun_) {}
+ProgressLine::ProgressLine() : terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 void ProgressLine::show(const std::string& text) {
   if (!terminal_) {
-    const auto now = std::chrono::steady_clock::now();
-    if (now - told_ < kNowAndThen) return;
-    told_ = now;
-    const auto since = std::chrono::duration_cast<std::chrono::seconds>(now - begun_);
-    std::cerr << "after " << since.count() << " s: " << text << std::endl;
+    const double now_s = clock_.elapsed();
+    if (now_s - told_s_ < kNowAndThen) return;
+    told_s_ = now_s;
+    std::cerr << fmt::format("after {:.0f} s: {}", now_s, text) << std::endl;
     return;
   }
   if (shown_ && text == text_) return;

@@ -2,8 +2,9 @@
 // does not look like none, a line now and then.
 #pragma once
 
-#include <chrono>
 #include <string>
+
+#include "bus/pacer.hpp"
 
 namespace vcnc {
 
@@ -16,7 +17,8 @@ class ProgressLine {
 
  private:
   bool terminal_;
-  std::chrono::steady_clock::time_point begun_, told_;
+  Pacer clock_;
+  double told_s_ = 0;  ///< host time of the last line
   bool shown_ = false;
   std::string text_;
 };
