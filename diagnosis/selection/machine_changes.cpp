@@ -225,9 +225,12 @@ bool MachineChanges::holds_up(const FittedMachine& m) const {
 }
 
 bool MachineChanges::spoils(const FittedMachine& m) const {
-  for (std::size_t c = 0; c < m.prediction.size(); ++c)
-    if (evidence_.rms(m.prediction, c, Role::held_out) >
-        kSpoils * evidence_.rms(base_.prediction, c, Role::held_out))
+  const std::vector<ComparedChannel>& channels = evidence_.replica().channels();
+  for (std::size_t c = 0; c < channels.size(); ++c)
+    if (!is_reading(channels[c].kind) &&
+        evidence_.rms(m.prediction, c, Role::held_out) >
+            kSpoils * std::max(evidence_.rms(base_.prediction, c, Role::held_out),
+                               evidence_.reckoned_with(c)))
       return true;
   return false;
 }

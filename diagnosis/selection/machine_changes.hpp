@@ -80,8 +80,9 @@ class MachineChanges {
   void hold_again(FittedMachine& m) const;
   /// Whether two effects of one place take each other back.
   bool cancels(const FittedMachine& m) const;
-  /// Whether some signal is much farther off than without all that was found: what explains one
-  /// signal and spoils another is not the cause.
+  /// Whether some signal of a drive is much farther off than without all that was found: what
+  /// explains one signal and spoils another is not the cause. (A reading of the tool is off by what
+  /// fits leave free, where the piece lies, too.)
   bool spoils(const FittedMachine& m) const;
   bool is_another_law(const AddedEffect& effect) const;
   /// Whether the controller's own signals say that a gain is not what it is told to be, or all of
