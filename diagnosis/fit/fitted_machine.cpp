@@ -204,7 +204,7 @@ void linearise(const Evidence& evidence, FittedMachine& m, const std::vector<std
 double settled(const Evidence& evidence, const FittedMachine& m) {
   constexpr double kLittle = 1e-4, kFarMore = 10;
   const double noise = evidence.count(Role::held_out), excess = std::max(0.0, m.held_out - noise);
-  return 5 + kLittle * excess * std::clamp(excess / noise, 1.0, kFarMore);
+  return 5 + kLittle * excess * std::clamp(excess / std::max(1.0, noise), 1.0, kFarMore);
 }
 
 /// Fits where the replica is exact: what is found there may be where it is not any more.

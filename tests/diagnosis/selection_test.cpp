@@ -590,8 +590,8 @@ TEST(Selection, WhatSpoilsASignalDoesNotHoldUp) {
     m.prediction = evidence.predict(m.machine);
     return changes.holds_up(m);
   };
-  EXPECT_TRUE(holds_up(1e-4));   // a position off by 26 nm beside 50 nm of noise
-  EXPECT_FALSE(holds_up(1e-2));  // by 2.6 um
+  EXPECT_TRUE(holds_up(1e-4));   // a position off by 21 nm rms beside 50 nm of noise
+  EXPECT_FALSE(holds_up(1e-2));  // by 2.1 um
 }
 
 /// What it measures lies somewhere.
