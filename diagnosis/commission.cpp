@@ -15,6 +15,7 @@
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/fit/intervals.hpp"
 #include "diagnosis/fit/refit.hpp"
+#include "diagnosis/fit/settling.hpp"
 #include "diagnosis/healthy/controller_lags.hpp"
 #include "diagnosis/records/measured_table.hpp"
 #include "diagnosis/replica/model_comparison.hpp"

@@ -4,7 +4,9 @@
 #include <set>
 
 #include "diagnosis/candidates/trial.hpp"
+#include "diagnosis/fit/converge.hpp"
 #include "diagnosis/fit/refit.hpp"
+#include "diagnosis/fit/settling.hpp"
 #include "diagnosis/screening/screening.hpp"
 #include "diagnosis/screening/trial_values.hpp"
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "diagnosis/fit/converge.hpp"
 #include "diagnosis/fit/ground.hpp"
 #include "diagnosis/fit/refit.hpp"
 

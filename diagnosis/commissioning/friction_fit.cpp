@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "diagnosis/fit/converge.hpp"
 #include "diagnosis/fit/refit.hpp"
+#include "diagnosis/fit/settling.hpp"
 
 namespace vcnc {
 namespace {
@@ -98,22 +100,54 @@ void FrictionFit::fit_part_of_motor() {
   const std::string level = machine_.candidates[motor[0]].numbers.front().key;
   if (number_of(machine_.now.machine, level) > 0) shares.push_back(0);
   machine_.rest();
-  std::vector<std::size_t> both_sides;
-  for (const std::size_t c : machine_.the(kFrictionLaws.back().effects, place_))
-    if (number_of(machine_.now.machine, machine_.candidates[c].numbers.front().key) != 0)
-      both_sides.push_back(c);
+  std::vector<std::size_t> both_sides = of_load();
   both_sides.push_back(motor[0]);
   std::vector<FittedMachine> better(shares.size());
   machine_.evidence.each_together(better.size(), [&](std::size_t i) {
     better[i] = machine_.with_candidates(machine_.now, both_sides);
     move_to_motor(better[i], shares[i]);
-    converge(machine_.evidence, better[i]);
+    converge_jointly(machine_.evidence, better[i]);
   });
   const auto best = std::min_element(
       better.begin(), better.end(),
       [](const FittedMachine& a, const FittedMachine& b) { return a.held_out < b.held_out; });
   if (machine_.gains_enough(machine_.now, *best, place_, kShareOfSide))
     machine_.accept(std::move(*best), place_, "part of its friction on the motor's side");
+  fit_law_beside_motor(motor[0]);
+}
+
+void FrictionFit::fit_law_beside_motor(std::size_t motor) {
+  machine_.rest();
+  const std::vector<std::size_t> simplest = machine_.the(kFrictionLaws.front().effects, place_),
+                                 has = of_load();
+  const auto is_in = [](const std::vector<std::size_t>& some, std::size_t c) {
+    return std::find(some.begin(), some.end(), c) != some.end();
+  };
+  std::vector<FittedMachine> trials(kFrictionLaws.size(), machine_.now);
+  machine_.evidence.each_together(trials.size(), [&](std::size_t i) {
+    std::vector<std::size_t> law = machine_.the(kFrictionLaws[i].effects, place_);
+    const bool lacks = std::any_of(has.begin(), has.end(), [&](auto c) { return !is_in(law, c); }),
+               adds = std::any_of(law.begin(), law.end(),
+                                  [&](auto c) { return !is_in(has, c) && !is_in(simplest, c); });
+    if (lacks || !adds) return;
+    law.push_back(motor);
+    trials[i] = machine_.with_candidates(machine_.now, law);
+    converge_jointly(machine_.evidence, trials[i]);
+  });
+  const auto best = std::min_element(
+      trials.begin(), trials.end(),
+      [](const FittedMachine& a, const FittedMachine& b) { return a.held_out < b.held_out; });
+  if (!machine_.gains_enough(machine_.now, *best, place_, kShareOfSide)) return;
+  const auto law = static_cast<std::size_t>(best - trials.begin());
+  machine_.accept(std::move(*best), place_, kFrictionLaws[law].name + " beside that of the motor");
+}
+
+std::vector<std::size_t> FrictionFit::of_load() const {
+  std::vector<std::size_t> some = machine_.the(kFrictionLaws.back().effects, place_);
+  std::erase_if(some, [&](std::size_t c) {
+    return number_of(machine_.now.machine, machine_.candidates[c].numbers.front().key) == 0;
+  });
+  return some;
 }
 
 /// A share of the dry and viscous friction of the load, on bristles of a usual stiffness.

@@ -25,7 +25,8 @@ class FrictionFit {
   void fit_anew(const std::vector<std::size_t>& since);
   /// Beside a gain.
   void fit_with(std::size_t gain);
-  /// Of an elastic transmission, what part of its friction is before it.
+  /// Of an elastic transmission, what part of its friction is before it, and what law the load has
+  /// beside that.
   void fit_part_of_motor();
 
  private:
@@ -36,6 +37,10 @@ class FrictionFit {
     std::optional<std::size_t> law;
   };
   Fitted with_best_law(const std::vector<std::size_t>& beside = {}) const;
+  /// The law was chosen where all of the friction was the load's: a richer one beside the motor's.
+  void fit_law_beside_motor(std::size_t motor);
+  /// Effects of the law that the load has.
+  std::vector<std::size_t> of_load() const;
   void move_to_motor(FittedMachine& m, double share) const;
 
   MachineInFit& machine_;

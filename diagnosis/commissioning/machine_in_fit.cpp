@@ -6,6 +6,8 @@
 #include <cmath>
 
 #include "diagnosis/fit/ground.hpp"
+#include "diagnosis/fit/joint_fit.hpp"
+#include "diagnosis/fit/settling.hpp"
 #include "diagnosis/healthy/controller_lags.hpp"
 #include "model/axes.hpp"
 
@@ -136,6 +138,7 @@ void MachineInFit::rest() {
 
 void MachineInFit::fit_together() {
   now = fit_numbers(evidence, now.machine, now.nuisances.numbers);
+  fit_jointly(evidence, now, every(now));
 }
 
 std::size_t MachineInFit::simplest_of_best(const std::vector<std::size_t>& some,

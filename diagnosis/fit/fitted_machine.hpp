@@ -1,9 +1,8 @@
-// A machine by hypothesis with everything that was computed at it, and fitting one.
+// A machine by hypothesis with everything that was computed at it.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
-#include <functional>
 #include <limits>
 #include <set>
 #include <string>
@@ -68,16 +67,22 @@ std::string drive_of(const std::string& key, const std::vector<Candidate>& candi
 std::set<std::string> drives_found(const FittedMachine& machine,
                                    const std::vector<Candidate>& candidates);
 
-/// Fits all numbers of a machine together, nuisances included, until nothing moves.
-void converge(const Evidence& evidence, FittedMachine& machine);
+/// A machine at what several refits of it found, with everything that is computed there.
+std::vector<FittedMachine> moved_to(const Evidence& evidence, const FittedMachine& machine,
+                                    const std::vector<Refit>& found);
+/// Computes everything where the machine stands; so do numbers that were begun elsewhere.
+void stay(const Evidence& evidence, FittedMachine& machine);
+/// Makes the replica exact at the machine and computes anew what it leaves.
+void anchor_at(Evidence& evidence, FittedMachine& machine);
 
-/// With declared numbers that were pulled further than some tolerances held at their declaration,
-/// of those that may be out of one: what is so far off is no matter of tolerance.
-FittedMachine within_tolerance(Evidence& evidence, FittedMachine machine, double tolerances,
-                               const std::function<bool(const FreedNumber&)>& may_be_out_of_one);
-
-/// Takes the sensitivities of all declared numbers where the machine stands, then fits as above.
-void converge_anew(const Evidence& evidence, FittedMachine& machine);
+/// Takes the sensitivities of some declared numbers where the machine stands.
+void linearise(const Evidence& evidence, FittedMachine& machine,
+               const std::vector<std::size_t>& which);
+/// All declared numbers.
+std::vector<std::size_t> every(const FittedMachine& machine);
+/// Those whose sensitivities are others than those of the declared machine: not those of a drive at
+/// which nothing was found.
+std::vector<std::size_t> concerned(const FittedMachine& machine);
 
 /// Frees those common numbers that make something of what was found: of the drives where that is,
 /// and of the probe.
@@ -86,31 +91,5 @@ void add_common(const Evidence& evidence, FittedMachine& machine,
 /// Holds those as declared again at whose drive nothing is any more; all of them where nothing is
 /// anywhere.
 void hold_common(FittedMachine& machine);
-
-/// Takes its numbers for what they are and fits from there, where the replica is exact.
-void settle_at(Evidence& evidence, FittedMachine& machine);
-
-/// Makes the replica exact at the machine and computes anew what it leaves.
-void anchor_at(Evidence& evidence, FittedMachine& machine);
-
-/// Chi-square of the held-out laps at which it is no use to fit on: no more than `little` can be
-/// gained by it, or what is left is `much` more than another machine leaves.
-struct NoUse {
-  double little = 0, much = std::numeric_limits<double>::infinity();
-
-  /// Whether so much is left that it stays too much if `hoped` is gained.
-  bool given_up(double left, double hoped) const { return left - std::max(0.0, hoped) > much; }
-};
-
-/// After an effect was added: takes the sensitivities of the declared numbers where the machine now
-/// stands and fits all together. Where the effect had been missing, some may have been pulled far;
-/// then fits again from the declarations, too, and keeps what is better.
-void settle_in(Evidence& evidence, FittedMachine& machine, const NoUse& no_use);
-
-/// The declared machine with its nuisances fitted, or with these numbers.
-FittedMachine fit_declared(Evidence& evidence, const Machine& declared,
-                           Against against = Against::declaration);
-FittedMachine fit_numbers(Evidence& evidence, const Machine& declared,
-                          std::vector<FreedNumber> numbers);
 
 }  // namespace vcnc

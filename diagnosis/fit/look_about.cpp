@@ -7,6 +7,7 @@
 
 #include "diagnosis/fit/ground.hpp"
 #include "diagnosis/fit/intervals.hpp"
+#include "diagnosis/fit/settling.hpp"
 
 namespace vcnc {
 namespace {

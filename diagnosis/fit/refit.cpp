@@ -64,6 +64,18 @@ struct StepBounds {
     low = -reach - offset;
     high = reach - offset;
   }
+  /// Nor out of what is allowed of it.
+  StepBounds within(const std::vector<FreedNumber>& numbers) const {
+    StepBounds closer = *this;
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const FreedNumber& n = numbers[i];
+      const auto at = static_cast<Eigen::Index>(i);
+      const auto [least, most] = std::minmax(n.number.min, n.number.max);
+      closer.low[at] = std::min(0.0, std::max(low[at], (least - n.value) / n.number.typical));
+      closer.high[at] = std::max(0.0, std::min(high[at], (most - n.value) / n.number.typical));
+    }
+    return closer;
+  }
   Eigen::VectorXd clamped(const Eigen::VectorXd& s) const { return s.cwiseMax(low).cwiseMin(high); }
   /// Numbers that are not at a bound beyond which they would go on downhill.
   std::vector<Eigen::Index> free_at(const Eigen::VectorXd& s, const Eigen::VectorXd& slope) const {
@@ -138,9 +150,8 @@ struct BoundedStep {
 };
 
 BoundedStep bounded_step(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
-                         const Eigen::VectorXd& precision, const Eigen::VectorXd& offset) {
+                         const StepBounds& bounds) {
   const Quadratic q{a, b};
-  const StepBounds bounds(precision, offset);
   BoundedStep s{stopped_at_bounds(q, bounds), {}};
   // Numbers whose columns nearly cancel each other stop at their bounds together, where the one
   // makes sense with the other beyond its own only.
@@ -176,7 +187,7 @@ Eliminated eliminate(const Eigen::MatrixXd& g, Eigen::Index live, const LinearPa
   a.diagonal().array() += 1e-12 * (1 + a.diagonal().maxCoeff());
   const Eigen::VectorXd b =
       g.block(1 + live, 0, n, 1) - Eigen::VectorXd(precision.cwiseProduct(offset));
-  BoundedStep bounded = bounded_step(a, b, precision, offset);
+  BoundedStep bounded = bounded_step(a, b, StepBounds(precision, offset));
   e.step = std::move(bounded.step);
   e.cost += e.step.dot(a * e.step) - 2 * b.dot(e.step);
   if (live > 0) {
@@ -189,6 +200,25 @@ Eliminated eliminate(const Eigen::MatrixXd& g, Eigen::Index live, const LinearPa
     }
   }
   return e;
+}
+
+LinearStep step_in(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& held_out,
+                   const Eigen::VectorXd& precision, const Eigen::VectorXd& offset, double damping,
+                   const StepBounds& bounds) {
+  const Eigen::Index n = precision.size();
+  LinearStep s;
+  Eigen::MatrixXd a = fitted.block(1, 1, n, n);
+  a.diagonal() *= 1 + damping;
+  a.diagonal() += precision;
+  a.diagonal().array() += 1e-10 * (1e-6 + a.diagonal().array());
+  const Eigen::VectorXd b =
+      fitted.block(1, 0, n, 1) - Eigen::VectorXd(precision.cwiseProduct(offset));
+  s.step = bounded_step(a, b, bounds).step;
+  const Eigen::VectorXd at = offset + s.step;
+  const double prior = at.dot(precision.cwiseProduct(at));
+  s.fitted = left_after(fitted, s.step) + prior;
+  s.held_out = left_after(held_out, s.step) + prior;
+  return s;
 }
 
 }  // namespace
@@ -224,20 +254,30 @@ LinearPart without(const LinearPart& part, const std::vector<FreedNumber>& live)
 LinearStep linear_step(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& held_out,
                        const Eigen::VectorXd& precision, const Eigen::VectorXd& offset,
                        double damping) {
-  const Eigen::Index n = precision.size();
-  LinearStep s;
-  Eigen::MatrixXd a = fitted.block(1, 1, n, n);
-  a.diagonal() *= 1 + damping;
-  a.diagonal() += precision;
-  a.diagonal().array() += 1e-10 * (1e-6 + a.diagonal().array());
-  const Eigen::VectorXd b =
-      fitted.block(1, 0, n, 1) - Eigen::VectorXd(precision.cwiseProduct(offset));
-  s.step = bounded_step(a, b, precision, offset).step;
-  const Eigen::VectorXd at = offset + s.step;
-  const double prior = at.dot(precision.cwiseProduct(at));
-  s.fitted = left_after(fitted, s.step) + prior;
-  s.held_out = left_after(held_out, s.step) + prior;
-  return s;
+  return step_in(fitted, held_out, precision, offset, damping, StepBounds(precision, offset));
+}
+
+LinearStep step_within_range(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& held_out,
+                             const std::vector<FreedNumber>& numbers, double damping) {
+  const LinearPart part{numbers, {}};
+  const Eigen::VectorXd precision = part.precision(), offset = part.offset();
+  return step_in(fitted, held_out, precision, offset, damping,
+                 StepBounds(precision, offset).within(numbers));
+}
+
+std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vector<FreedNumber> to,
+                                 double share) {
+  for (FreedNumber& n : to) {
+    for (const FreedNumber& f : from)
+      if (f.number.key == n.number.key) n.value = f.value + share * (n.value - f.value);
+    if (n.tolerance > 0) {
+      const double reach = kFarthestPull * n.tolerance;
+      n.value = std::clamp(n.value, n.centre - reach, n.centre + reach);
+    }
+    n.value = std::clamp(n.value, std::min(n.number.min, n.number.max),
+                         std::max(n.number.min, n.number.max));
+  }
+  return to;
 }
 
 std::vector<Column> columns_of(const Evidence& evidence, const Machine& machine,

@@ -49,6 +49,14 @@ LinearStep linear_step(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& hel
                        const Eigen::VectorXd& precision, const Eigen::VectorXd& offset,
                        double damping = 0);
 
+/// The same where numbers stay within what is allowed of them, too.
+LinearStep step_within_range(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& held_out,
+                             const std::vector<FreedNumber>& numbers, double damping);
+
+/// Part of the way from some numbers to others, or beyond, within what is allowed of them.
+std::vector<FreedNumber> between(const std::vector<FreedNumber>& from, std::vector<FreedNumber> to,
+                                 double share);
+
 struct Refit {
   std::vector<FreedNumber> live, linear;  ///< at the solution
   Machine machine;                        ///< with both

@@ -11,6 +11,7 @@
 #include "diagnosis/evidence/noise_audit.hpp"
 #include "diagnosis/evidence/partition.hpp"
 #include "diagnosis/fit/fitted_machine.hpp"
+#include "diagnosis/fit/settling.hpp"
 #include "diagnosis/healthy/controller_check.hpp"
 #include "diagnosis/healthy/controller_lags.hpp"
 #include "diagnosis/records/any_record.hpp"

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "diagnosis/fit/intervals.hpp"
+#include "diagnosis/fit/settling.hpp"
 #include "diagnosis/laws/law_columns.hpp"
 #include "diagnosis/laws/law_fit.hpp"
 #include "diagnosis/laws/law_in_loop.hpp"

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "diagnosis/fit/converge.hpp"
+#include "diagnosis/fit/settling.hpp"
 #include "diagnosis/laws/law_fit.hpp"
 #include "diagnosis/parallel.hpp"
 

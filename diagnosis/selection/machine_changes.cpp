@@ -6,7 +6,9 @@
 #include <string>
 #include <utility>
 
+#include "diagnosis/fit/converge.hpp"
 #include "diagnosis/fit/intervals.hpp"
+#include "diagnosis/fit/settling.hpp"
 #include "diagnosis/selection/released_numbers.hpp"
 #include "model/axes.hpp"
 

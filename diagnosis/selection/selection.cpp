@@ -9,6 +9,7 @@
 
 #include "diagnosis/fit/intervals.hpp"
 #include "diagnosis/fit/look_about.hpp"
+#include "diagnosis/fit/settling.hpp"
 #include "diagnosis/screening/detection_limits.hpp"
 #include "diagnosis/selection/contest.hpp"
 #include "diagnosis/selection/exchange.hpp"

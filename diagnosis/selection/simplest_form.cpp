@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "diagnosis/candidates/trial.hpp"
+#include "diagnosis/fit/converge.hpp"
 #include "diagnosis/fit/ground.hpp"
 #include "diagnosis/fit/intervals.hpp"
 #include "diagnosis/fit/needed_numbers.hpp"

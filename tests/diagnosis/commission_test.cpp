@@ -81,6 +81,22 @@ TEST(Commission, FindsTheBristlesOfADeclaredMotorFriction) {
   EXPECT_NEAR(number_of(c.machine, "effects.X.motor_friction.stiffness_N_per_um"), 30, 3);
 }
 
+/// One after the other, each side keeps what the other one has got wrong: break-away of 22 N and
+/// 172 N at the motor had been found.
+TEST(Commission, FitsTheFrictionOfBothSidesAtTheSameTime) {
+  if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";
+  Effects effects;
+  const Windup windup = Windup::nominal(false);
+  effects.axis[kX].get<Windup>() = windup;
+  effects.axis[kX].get<Coulomb>().level = 80;
+  effects.axis[kX].get<Stribeck>() = {.excess = 30, .velocity = 0.004};
+  effects.axis[kX].get<MotorFriction>() = {.level = 180, .viscous = 300, .stiffness = 3e7};
+  const Commissioning c = commissioned_x(effects, windup, MotorFriction{.level = 170});
+  EXPECT_NEAR(number_of(c.machine, "effects.X.coulomb.level_N"), 80, 0.08 * 80);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.stribeck.excess_N"), 30, 0.1 * 30);
+  EXPECT_NEAR(number_of(c.machine, "effects.X.motor_friction.level_N"), 180, 0.04 * 180);
+}
+
 /// A screw has waves and a motor has ripple when they are healthy, and a hose pulls.
 TEST(Commission, RecoversWhatHangsOnWhereAnAxisIs) {
   if (kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer";

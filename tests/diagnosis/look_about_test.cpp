@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "diagnosis/fit/intervals.hpp"
+#include "diagnosis/fit/settling.hpp"
 #include "toy_machine.hpp"
 
 namespace vcnc::look_about_test {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "diagnosis/fit/settling.hpp"
 #include "diagnosis/healthy/common_numbers.hpp"
 #include "diagnosis/selection/machine_changes.hpp"
 #include "toy_machine.hpp"
