@@ -21,9 +21,9 @@ struct Commissioning {
 
 /// Fits the lags of the loops by what the controllers make of their own signals
 /// (controller_lags.hpp), declared numbers within their tolerances and, axis by axis, the simplest
-/// friction law that does best on held-out data: none, dry and viscous, with break-away, with pre-
-/// sliding, with both; then gains of its loops, feed-forwards and lags, the best first, where held-
-/// out data ask for them and the controller's signals do not contradict, with another law of
+/// friction law that does best on held-out data: none, dry and viscous, with break-away, with
+/// pre-sliding, with both; then gains of its loops, feed-forwards and lags, the best first, where
+/// held-out data ask for them and the controller's signals do not contradict, with another law of
 /// friction where the first one imitates a gain so well that no way leads to that; then what hangs
 /// on where the axis is (ripple and cogging, uneven screws and encoders, weight, springs, uneven
 /// friction), the best first, what is a twentieth of what is left, after which friction and gains
